@@ -1,0 +1,86 @@
+"""Errors that carry evidence. Every one of them is a message for a person, never a traceback.
+
+The command line turns them into exit codes: `InputError` is 2, the renderer errors are 3.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+
+class SnellcheckError(Exception):
+    """Base of all errors that a user can cause or cure."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong in one place of one input file.
+
+    `line` counts from 1 and is None where the position is unknown; `key` is the dotted path of
+    the value, such as ``solids[0].shape.radius``.
+    """
+
+    message: str
+    file: Path | None = None
+    line: int | None = None
+    key: str = ""
+    value: str | None = None
+    expected: str | None = None
+    suggestion: str | None = None
+
+    def __str__(self) -> str:
+        place = str(self.file) if self.file else "<input>"
+        if self.line is not None:
+            place += f":{self.line}"
+        text = f"{place}: {self.key}: {self.message}" if self.key else f"{place}: {self.message}"
+        if self.value is not None:
+            text += f"; got {self.value}"
+        if self.expected is not None:
+            text += f"; expected {self.expected}"
+        if self.suggestion is not None:
+            text += f"; did you mean {self.suggestion}?"
+        return text
+
+
+@dataclass
+class InputError(SnellcheckError):
+    """All problems found in what the user gave, reported at once."""
+
+    problems: list[Problem] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, message: str, **where: object) -> InputError:
+        """An error with a single problem; `where` are the fields of `Problem`."""
+        return cls([Problem(message, **where)])  # type: ignore[arg-type]
+
+    def __str__(self) -> str:
+        return "\n".join(str(p) for p in self.problems)
+
+
+class RendererError(SnellcheckError):
+    """A renderer did not deliver. `log` is the tail of what it said."""
+
+    def __init__(self, message: str, *, log: str = "") -> None:
+        super().__init__(message)
+        self.log = log
+
+
+class RendererMissing(RendererError):
+    """The renderer is not installed. The message names the command that installs it: SKIP."""
+
+
+class RendererUnsupported(RendererError):
+    """The renderer says that it cannot do what the scene asks: SKIP."""
+
+
+class RendererFailed(RendererError):
+    """The renderer crashed, hung, ran out of memory or wrote something unreadable: ERROR."""
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name closest to `name`, or None where nothing is close."""
+    matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
+    return matches[0] if matches else None

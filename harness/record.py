@@ -1,0 +1,253 @@
+"""The record: one versioned JSON document per case and run, and the summary of a run.
+
+This module is its only reader and writer. The report, the baseline check, JUnit and the summary
+read nothing else.
+"""
+
+from __future__ import annotations
+
+import enum
+import os
+import tempfile
+from pathlib import Path
+from typing import Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from harness.errors import InputError
+
+Document = TypeVar("Document", bound="BaseModel")
+
+RECORD_SCHEMA = "snellcheck-record/1"
+SUMMARY_SCHEMA = "snellcheck-summary/1"
+
+
+class Verdict(enum.StrEnum):
+    """PASS and KNOWN are green. KNOWN is a deviation that the scene documents, at its stated size."""
+
+    PASS = "pass"
+    FAIL = "fail"
+    SKIP = "skip"
+    ERROR = "error"
+    KNOWN = "known"
+
+
+# The order in which verdicts of parts decide the verdict of the whole, worst first.
+SEVERITY = (Verdict.ERROR, Verdict.FAIL, Verdict.SKIP, Verdict.KNOWN, Verdict.PASS)
+
+
+def worst(verdicts: list[Verdict]) -> Verdict:
+    """The verdict of a whole; nothing at all is an ERROR, because it shows nothing."""
+    return min(verdicts, key=SEVERITY.index, default=Verdict.ERROR)
+
+
+class Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+
+
+class Check(Model):
+    """One comparison. `value` is compared with `expected` within `tolerance`.
+
+    `value` and `expected` are None where nothing could be measured; then `status` is SKIP or
+    ERROR and `reason` says why. `detail` holds further figures by name (max, rms, p999, pixels
+    excluded and why, the worst ray); `derivation` says where the tolerance comes from.
+    """
+
+    id: str
+    renderer: str
+    against: str  # "truth", "baseline" or a renderer's name
+    observable: str
+    value: float | None
+    expected: float | None
+    tolerance: float | None
+    unit: str
+    status: Verdict
+    reason: str
+    derivation: str = ""
+    detail: dict[str, float | int | str] = Field(default_factory=dict)
+
+
+class ImageFile(Model):
+    """A stored image; `path` is relative to the run's folder. `role` is "image", "probe", …"""
+
+    role: str
+    path: str
+    thumbnail: str | None = None
+    sha256: str
+    width: int
+    height: int
+
+
+class DifferenceMap(Model):
+    """|a - b| as a picture, black to white from 0 to `limit`, with its figures."""
+
+    a: str
+    b: str
+    path: str
+    limit: float
+    unit: str
+
+
+class RendererRun(Model):
+    """What one renderer did for one case."""
+
+    name: str
+    version: str
+    status: Verdict
+    reason: str = ""
+    render_s: float = 0.0
+    renders: int = 0
+    command: str = ""
+    log_tail: str = ""
+    settings: dict[str, float | int | str] = Field(default_factory=dict)
+    images: list[ImageFile] = Field(default_factory=list)
+
+
+class Series(Model):
+    """One line of a chart. `renderer` is a renderer's name or "truth"."""
+
+    renderer: str
+    x: list[float]
+    y: list[float]
+
+
+class Curve(Model):
+    """A measured curve beside its truth, with what is left when truth is taken away.
+
+    `tolerance` (same length as residual x) draws the band within which residuals must lie.
+    """
+
+    id: str
+    title: str
+    x_label: str
+    y_label: str
+    series: list[Series]
+    residual_label: str = ""
+    residuals: list[Series] = Field(default_factory=list)
+    tolerance: list[float] = Field(default_factory=list)
+
+
+class Table(Model):
+    """A small table of text shown with the case, such as the lecture's erratum."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[str]]
+    note: str = ""
+
+
+class CaseRecord(Model):
+    """Everything that is known of one permutation of one case after a run."""
+
+    record_schema: Literal["snellcheck-record/1"] = Field(default=RECORD_SCHEMA, alias="schema")
+    id: str
+    case: str  # the scene file's name without its parameters
+    family: str
+    title: str
+    description: str = ""
+    lecture: str = ""
+    sources: list[str] = Field(default_factory=list)
+    formula: str = ""
+    parameters: dict[str, float | int | str] = Field(default_factory=dict)
+    scene_sha256: str
+    scene_file: str
+    quality: str
+    snellcheck_version: str
+    started: str  # ISO 8601, UTC
+    wall_s: float
+    status: Verdict
+    runs: list[RendererRun]
+    checks: list[Check]
+    curves: list[Curve] = Field(default_factory=list)
+    differences: list[DifferenceMap] = Field(default_factory=list)
+    tables: list[Table] = Field(default_factory=list)
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"
+    )
+
+
+class RendererSummary(Model):
+    version: str
+    status: str  # "ok", "missing", "failed preflight", "failed"
+    cases: int
+    render_s: float
+    reason: str = ""
+    remedy: str = ""
+    facts: dict[str, float | int | str] = Field(default_factory=dict)  # preflight resolution …
+
+
+class Counts(Model):
+    model_config = ConfigDict(extra="forbid", populate_by_name=True)
+
+    passed: int = Field(default=0, alias="pass")
+    fail: int = 0
+    skip: int = 0
+    error: int = 0
+    known: int = 0
+
+
+class SummaryCase(Model):
+    id: str
+    family: str
+    status: Verdict
+    checks: list[Check]
+
+
+class Summary(Model):
+    """`summary.json`. `counts` counts checks."""
+
+    summary_schema: Literal["snellcheck-summary/1"] = Field(default=SUMMARY_SCHEMA, alias="schema")
+    snellcheck_version: str
+    started: str
+    wall_s: float
+    quality: str
+    command: str = ""
+    exit_code: int
+    renderers: dict[str, RendererSummary]
+    counts: Counts
+    cases: list[SummaryCase]
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"
+    )
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes all of `text` or nothing: to a temporary name beside `path`, then renamed."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+        Path(name).chmod(0o644)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+
+
+def write(document: CaseRecord | Summary, path: Path) -> None:
+    """Writes a record or summary atomically."""
+    write_text(path, document.model_dump_json(by_alias=True, indent=1) + "\n")
+
+
+def _read(path: Path, kind: type[Document]) -> Document:
+    try:
+        return kind.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise InputError.of(f"cannot be read: {error.strerror}", file=path) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise InputError.of(f"not a valid record: {first['msg']}", file=path, key=key) from error
+
+
+def read_case(path: Path) -> CaseRecord:
+    """Raises InputError where `path` is unreadable or not a record of this version."""
+    return _read(path, CaseRecord)
+
+
+def read_summary(path: Path) -> Summary:
+    """Raises InputError where `path` is unreadable or not a summary of this version."""
+    return _read(path, Summary)

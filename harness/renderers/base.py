@@ -1,0 +1,157 @@
+"""What a renderer is to the harness: a name, a version, what it can do, and `render`.
+
+A renderer that can also tell where single rays go offers `trace`. All built-in renderers reach
+the harness through this protocol and the entry-point group ``snellcheck.renderers``, as a third
+party's do.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.scene.resolved import ResolvedScene
+
+Float = NDArray[np.float64]
+
+
+class Capability(enum.StrEnum):
+    """What a renderer claims to model. A scene that needs more is a SKIP with the reason."""
+
+    IMAGE = "image"  # can write images
+    RAYS = "rays"  # offers trace()
+    PIXEL_CENTRES = "pixel-centres"  # samples exactly the pixel centre; no noise
+    LOBE_SWITCH = "lobe-switch"  # honours transport.reflection / .transmission
+    SPHERE = "sphere"  # analytic, not tessellated
+    CONVEX = "convex"
+    CYLINDER = "cylinder"
+    MESH = "mesh"
+    SMOOTH_MESH = "smooth-mesh"
+    THIN_SLAB = "thin-slab"  # the lecture's thin face; others are given a real slab
+    MIRROR = "mirror"
+    DIFFUSE = "diffuse"  # with point lights
+    TRANSLUCENT = "translucent"
+    PICTURE = "picture"
+    ABSORPTION = "absorption"
+    FRESNEL = "fresnel"  # R and T weigh the lobes, unpolarised at each interface
+    NESTED = "nested"  # solids inside solids
+    CAMERA_INSIDE = "camera-inside"  # camera inside a medium
+    RADIANCE_N2 = "radiance-n2"  # radiance scales with the square of the index
+
+
+class Status(enum.IntEnum):
+    """How a followed ray ended."""
+
+    HIT = 0  # landed on a surface that bounds no medium
+    MISS = 1  # left the scene
+    TIR = 2  # the path asked for transmission where there is none
+    CUT = 3  # max_depth was reached first
+
+
+@dataclass(frozen=True)
+class Rays:
+    """`origins` and unit `directions`, each (n, 3) float64 in world coordinates."""
+
+    origins: Float
+    directions: Float
+
+
+@dataclass(frozen=True)
+class RayPaths:
+    """Where rays ended that took a given path, e.g. "TT": transmitted at both interfaces.
+
+    `status` (n,) int8 of `Status`; `surface` (n,) int32 index into scene.surfaces or -1;
+    `point` (n, 3) where it landed, NaN unless HIT; `direction` (n, 3) last travel direction;
+    `weight` (n,) product of Fresnel factors; `optical_length` (n,) sum of ior * length.
+    `vertices` (n, k, 3), NaN-padded, is there only when asked for.
+    """
+
+    status: NDArray[np.int8]
+    surface: NDArray[np.int32]
+    point: Float
+    direction: Float
+    weight: Float
+    optical_length: Float
+    vertices: Float | None = None
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """How to render; what to render is the scene."""
+
+    samples: int = 64  # per pixel, for renderers that sample
+    seed: int = 0
+    threads: int = 2
+    timeout_s: float = 120.0
+    memory_mb: int = 4096
+
+
+@dataclass(frozen=True)
+class Image:
+    """`pixels` (H, W, 3) float32, linear Rec. 709 radiance, row 0 at the top.
+
+    `variance` (H, W, 3) is the estimated variance of each pixel's mean where the renderer
+    samples, else None.
+    """
+
+    pixels: NDArray[np.float32]
+    variance: NDArray[np.float32] | None = None
+    seconds: float = 0.0  # the renderer's own time, start-up excluded where it says so
+    log: str = ""
+    command: str = ""  # what was run, for people to run again
+
+
+@dataclass(frozen=True)
+class Health:
+    """What `snellcheck doctor` found. `remedy` is the command that mends what is wrong."""
+
+    name: str
+    usable: bool
+    version: str = ""
+    path: str = ""
+    detail: str = ""
+    remedy: str = ""
+    facts: dict[str, str] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Renderer(Protocol):
+    """The one seam between harness and renderers."""
+
+    name: str
+    capabilities: frozenset[Capability]
+
+    def version(self) -> str:
+        """Version of the renderer. Raises RendererMissing where it is not installed."""
+        ...
+
+    def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
+        """Raises RendererMissing, RendererUnsupported or RendererFailed."""
+        ...
+
+    def health(self) -> Health:
+        """Probes with a real tiny render in a child process. Never raises."""
+        ...
+
+    def emit(self, scene: ResolvedScene, folder: Path) -> Path:
+        """Writes what the renderer would be given into `folder`; returns the main file."""
+        ...
+
+
+@runtime_checkable
+class RayTracingRenderer(Renderer, Protocol):
+    """A renderer with a ray API (`Capability.RAYS`)."""
+
+    def trace(
+        self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
+    ) -> RayPaths:
+        """Follows each ray along `path`, a letter per interface: T transmit, R reflect.
+
+        After the last letter the ray must land on a surface; interfaces beyond the path are CUT.
+        """
+        ...

@@ -1,0 +1,1 @@
+"""Scene files: read, validated, expanded over their axes and resolved to numbers."""

@@ -1,0 +1,319 @@
+"""The resolved scene: numbers only, the one document that every renderer is given.
+
+`ResolvedScene.model_dump_json()` is `scene.json`, which an outside renderer reads; its JSON
+Schema is published by ``snellcheck schema --of scene``. All decisions are made before this point,
+so no translator asks about units, handedness, degrees or defaults.
+
+Conventions
+-----------
+* Right-handed, +Y up, column vectors, lengths in scene units, radiance linear Rec. 709.
+* `ior` is the absolute index of refraction; media[0] is what surrounds everything.
+* A solid is closed, filled with `medium`, and lies wholly inside `exterior`.
+* Normals of solids point outwards. A face's front is the side its frame's z axis points to;
+  cameras of conformance scenes see emissive faces from the front only.
+* `max_depth` counts path segments: camera to first surface is 1.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Vec3 = tuple[float, float, float]
+Rgb = tuple[float, float, float]
+Triple = tuple[int, int, int]
+
+SCENE_FORMAT: Literal["snellcheck-scene"] = "snellcheck-scene"
+
+
+class Frozen(BaseModel):
+    """Immutable, and anything unknown in it is an error."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Frame(Frozen):
+    """An orthonormal right-handed frame in world coordinates: p = origin + a x + b y + c z."""
+
+    origin: Vec3
+    x: Vec3
+    y: Vec3
+    z: Vec3
+
+
+# --- shapes -------------------------------------------------------------------------------------
+
+
+class Sphere(Frozen):
+    type: Literal["sphere"] = "sphere"
+    center: Vec3
+    radius: float
+
+
+class Convex(Frozen):
+    """A convex polyhedron: box, slab, prism, wedge.
+
+    Inside is where ``n . p <= d`` for every plane ``(n_x, n_y, n_z, d)``, n unit and outward.
+    `faces[k]` lists the vertices of the polygon in `planes[k]`, counter-clockwise from outside.
+    """
+
+    type: Literal["convex"] = "convex"
+    planes: tuple[tuple[float, float, float, float], ...]
+    vertices: tuple[Vec3, ...]
+    faces: tuple[tuple[int, ...], ...]
+
+
+class Cylinder(Frozen):
+    """Capped cylinder; axis along frame.z, from -height/2 to +height/2."""
+
+    type: Literal["cylinder"] = "cylinder"
+    frame: Frame
+    radius: float
+    height: float
+
+
+class Mesh(Frozen):
+    """Closed triangle mesh, counter-clockwise from outside.
+
+    With `normals` (one per vertex, unit) the surface is shaded smoothly: rays refract at the
+    interpolated normal. Without, at the geometric normal of the triangle.
+    """
+
+    type: Literal["mesh"] = "mesh"
+    vertices: tuple[Vec3, ...]
+    triangles: tuple[Triple, ...]
+    normals: tuple[Vec3, ...] | None = None
+
+
+class Rectangle(Frozen):
+    """Open face: size[0] along frame.x, size[1] along frame.y, centred on the origin.
+
+    Texture coordinates run from (0, 0) at (-x, -y) to (1, 1) at (+x, +y).
+    """
+
+    type: Literal["rectangle"] = "rectangle"
+    frame: Frame
+    size: tuple[float, float]
+
+
+class Disk(Frozen):
+    """Open face of `radius` around frame.origin; texture coordinates as its bounding square."""
+
+    type: Literal["disk"] = "disk"
+    frame: Frame
+    radius: float
+
+
+SolidShape = Annotated[Sphere | Convex | Cylinder | Mesh, Field(discriminator="type")]
+SurfaceShape = Annotated[
+    Sphere | Convex | Cylinder | Mesh | Rectangle | Disk, Field(discriminator="type")
+]
+
+
+# --- patterns: radiance over (u, v) ---------------------------------------------------------------
+
+
+class Constant(Frozen):
+    type: Literal["constant"] = "constant"
+    radiance: Rgb
+
+
+class Checker(Frozen):
+    """cells[0] x cells[1] cells; the cell at (0, 0) has radiance `a`, its neighbours `b`."""
+
+    type: Literal["checker"] = "checker"
+    a: Rgb
+    b: Rgb
+    cells: tuple[int, int]
+
+
+class Ramp(Frozen):
+    """start at coordinate 0, end at coordinate 1, linear in between."""
+
+    type: Literal["ramp"] = "ramp"
+    start: Rgb
+    end: Rgb
+    axis: Literal["u", "v"]
+
+
+class PositionCode(Frozen):
+    """amplitude * (c, frac(cells * c), 1) with c = u or v: where did this pixel's ray land?"""
+
+    type: Literal["position_code"] = "position_code"
+    axis: Literal["u", "v"]
+    cells: int
+    amplitude: float
+
+
+class Picture(Frozen):
+    """Nearest-texel image. `pixels` is base64 of little-endian uint16 RGB, row 0 at the top.
+
+    A value k is radiance k / 65535. u = 0 is the left edge, v = 1 the top edge.
+    """
+
+    type: Literal["picture"] = "picture"
+    width: int
+    height: int
+    pixels: str
+
+
+Pattern = Annotated[
+    Constant | Checker | Ramp | PositionCode | Picture, Field(discriminator="type")
+]
+
+
+# --- materials of surfaces that bound no medium ---------------------------------------------------
+
+
+class Emissive(Frozen):
+    """Emits the pattern's radiance in all directions and reflects nothing."""
+
+    type: Literal["emissive"] = "emissive"
+    pattern: Pattern
+
+
+class Diffuse(Frozen):
+    """Lambertian, lit by point lights: L = reflectance / pi * I cos(theta) / r^2."""
+
+    type: Literal["diffuse"] = "diffuse"
+    reflectance: Rgb
+
+
+class Mirror(Frozen):
+    type: Literal["mirror"] = "mirror"
+    reflectance: Rgb
+
+
+class Translucent(Frozen):
+    """The lecture's translucence; rays pass straight through.
+
+    Of the light, ``filter * color + transmit`` passes (the filtered part takes the surface's
+    diffuse colour, the transmitted part is untinted) and a Lambertian reflectance of
+    ``(1 - filter - transmit) * color`` remains.
+    """
+
+    type: Literal["translucent"] = "translucent"
+    color: Rgb
+    filter: float
+    transmit: float
+
+
+class ThinSlab(Frozen):
+    """The lecture's thin face: offsets the ray as a slab of `thickness` would, keeps its direction.
+
+    The face is the slab's front; the slab extends `thickness` behind it. Both sides of it are
+    `exterior`.
+    """
+
+    type: Literal["thin_slab"] = "thin_slab"
+    medium: int
+    exterior: int
+    thickness: float
+
+
+Material = Annotated[
+    Emissive | Diffuse | Mirror | Translucent | ThinSlab, Field(discriminator="type")
+]
+
+
+# --- the scene ------------------------------------------------------------------------------------
+
+
+class Medium(Frozen):
+    """`absorption` is Napierian, per scene unit and colour channel: T = exp(-absorption L)."""
+
+    name: str
+    ior: float
+    absorption: Rgb = (0.0, 0.0, 0.0)
+
+
+class Solid(Frozen):
+    name: str
+    shape: SolidShape
+    medium: int
+    exterior: int
+
+
+class Surface(Frozen):
+    name: str
+    shape: SurfaceShape
+    material: Material
+
+
+class PointLight(Frozen):
+    """`intensity` is radiant intensity: irradiance = intensity cos(theta) / r^2."""
+
+    type: Literal["point"] = "point"
+    position: Vec3
+    intensity: Rgb
+
+
+class Perspective(Frozen):
+    """Pinhole. The ray through pixel (i, j) of a W x H film, row 0 at the top, has direction
+
+    forward + (2 (i + .5) / W - 1) k right + (1 - 2 (j + .5) / H) k (H / W) up
+
+    with k = `tan_half_fov_x`; right, up, forward are orthonormal, right = forward x up.
+    `medium` is what the camera stands in.
+    """
+
+    type: Literal["perspective"] = "perspective"
+    origin: Vec3
+    right: Vec3
+    up: Vec3
+    forward: Vec3
+    tan_half_fov_x: float
+    medium: int = 0
+
+
+class Orthographic(Frozen):
+    """Parallel rays along `forward` from the plane through `origin`, `width` units across.
+
+    The ray through pixel (i, j) starts at
+    origin + (2 (i + .5) / W - 1) w/2 right + (1 - 2 (j + .5) / H) (H / W) w/2 up.
+    """
+
+    type: Literal["orthographic"] = "orthographic"
+    origin: Vec3
+    right: Vec3
+    up: Vec3
+    forward: Vec3
+    width: float
+    medium: int = 0
+
+
+Camera = Annotated[Perspective | Orthographic, Field(discriminator="type")]
+
+
+class Film(Frozen):
+    width: int = Field(ge=1, le=16384)
+    height: int = Field(ge=1, le=16384)
+
+
+class Transport(Frozen):
+    """How far light is followed.
+
+    `reflection` and `transmission` say which lobes of a dielectric are followed; total internal
+    reflection always is. A probe switches lobes off to isolate one path; a renderer that cannot
+    follows both and relies on `max_depth`.
+    """
+
+    max_depth: int = Field(ge=1)
+    min_weight: float = Field(ge=0.0, lt=1.0)
+    reflection: bool = True
+    transmission: bool = True
+
+
+class ResolvedScene(Frozen):
+    format: Literal["snellcheck-scene"] = SCENE_FORMAT
+    version: Literal[1] = 1
+    metres_per_unit: float = 1.0
+    film: Film
+    camera: Camera
+    media: tuple[Medium, ...]
+    solids: tuple[Solid, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
+    lights: tuple[PointLight, ...] = ()
+    background: Rgb = (0.0, 0.0, 0.0)
+    transport: Transport
