@@ -68,10 +68,15 @@ class Check(Model):
 
 
 class ImageFile(Model):
-    """A stored image; `path` is relative to the run's folder. `role` is "image", "probe", …"""
+    """A stored image; all paths are relative to the run's folder. `role` is "image", "probe", …
+
+    `path` is the linear data (EXR); `picture` is the same at full size as a browser can show it,
+    `thumbnail` a smaller one.
+    """
 
     role: str
     path: str
+    picture: str | None = None
     thumbnail: str | None = None
     sha256: str
     width: int
@@ -79,7 +84,7 @@ class ImageFile(Model):
 
 
 class DifferenceMap(Model):
-    """|a - b| as a picture, black to white from 0 to `limit`, with its figures."""
+    """|a - b| as a picture, in the colours of `harness.report.colours` from 0 to `limit`."""
 
     a: str
     b: str
@@ -100,6 +105,7 @@ class RendererRun(Model):
     command: str = ""
     log_tail: str = ""
     settings: dict[str, float | int | str] = Field(default_factory=dict)
+    files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: emitted scene …
     images: list[ImageFile] = Field(default_factory=list)
 
 
@@ -161,6 +167,7 @@ class CaseRecord(Model):
     curves: list[Curve] = Field(default_factory=list)
     differences: list[DifferenceMap] = Field(default_factory=list)
     tables: list[Table] = Field(default_factory=list)
+    files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: scene.json …
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"
@@ -213,18 +220,23 @@ class Summary(Model):
     )
 
 
-def write_text(path: Path, text: str) -> None:
-    """Writes all of `text` or nothing: to a temporary name beside `path`, then renamed."""
+def write_bytes(path: Path, data: bytes) -> None:
+    """Writes all of `data` or nothing: to a temporary name beside `path`, then renamed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
         Path(name).chmod(0o644)
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes `text` as UTF-8, all of it or nothing."""
+    write_bytes(path, text.encode("utf-8"))
 
 
 def write(document: CaseRecord | Summary, path: Path) -> None:
