@@ -1,0 +1,34 @@
+# Everything runs from .venv, which `make setup` makes and keeps up to date.
+BIN := .venv/bin
+
+.PHONY: help setup suite test lint format lock clean
+.DEFAULT_GOAL := help
+
+help: ## Say what can be made
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+
+setup: ## Install what is missing: the Python environment, POV-Ray, libLLVM
+	@scripts/setup
+
+suite: setup ## Run the conformance suite and write reports/latest/index.html
+	@$(BIN)/snellcheck run $(ARGS)
+
+test: lint ## Run all tests
+	@$(BIN)/python -m pytest -n 2
+
+lint: setup ## Check style and types
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/ruff format --check --quiet
+	@$(BIN)/mypy
+
+format: setup ## Mend what of the style can be mended by a program
+	@$(BIN)/ruff check --fix --quiet
+	@$(BIN)/ruff format
+
+lock: ## Rebuild requirements/*.txt from pyproject.toml (UPGRADE=1: newer versions)
+	@scripts/lock
+
+clean: ## Remove the environment, caches and reports
+	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +
+	find reports -mindepth 1 ! -name README.md -exec rm -rf {} +
