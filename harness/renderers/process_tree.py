@@ -1,0 +1,139 @@
+"""A started process together with everything that it has started since.
+
+A renderer may fork, daemonise or leave children behind. All of them count towards its memory,
+and all of them end with it. Members are recognised by the session that the process leads and by
+a token in their environment, so that a child which leaves the session is found too. (One that
+leaves the session *and* empties its environment is not; no portable means finds it.)
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO
+
+import psutil
+
+from harness.errors import RendererFailed, RendererMissing
+
+TOKEN = "SNELLCHECK_PROCESS"
+
+Pipe = int | IO[bytes]
+
+
+class ProcessTree:
+    """Made by `spawn`. `process` is the root; its standard streams are the caller's."""
+
+    def __init__(self, process: subprocess.Popen[bytes], token: str, before: set[int]) -> None:
+        self.process = process
+        self._token = token
+        self._before = before  # alive before the root was started, so no members
+        self._members = {process.pid: psutil.Process(process.pid)}
+        self._strangers: set[int] = set()
+
+    def resident_mb(self) -> float:
+        """Resident memory of all members in MiB; pages that they share are counted for each."""
+        self._find_members()
+        total = 0
+        for member in self._members.values():
+            with contextlib.suppress(psutil.Error):
+                total += member.memory_info().rss
+        return total / 2**20
+
+    def kill(self) -> None:
+        """Ends every member at once. Harmless where all of them are gone."""
+        while True:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+            known = len(self._members)
+            self._find_members()
+            for member in self._members.values():
+                with contextlib.suppress(psutil.Error):
+                    member.kill()  # psutil makes sure that the pid was not given to another
+            if len(self._members) <= known:
+                break
+        # A killed process may still run for a moment; the root is for the caller to wait for.
+        others = [m for pid, m in self._members.items() if pid != self.process.pid]
+        psutil.wait_procs(others, timeout=2)
+
+    def _find_members(self) -> None:
+        pids = set(psutil.pids())
+        self._strangers &= pids
+        for pid in pids - self._before - self._strangers - self._members.keys():
+            if self._is_member(pid):
+                with contextlib.suppress(psutil.Error):
+                    self._members[pid] = psutil.Process(pid)
+            else:
+                self._strangers.add(pid)
+
+    def _is_member(self, pid: int) -> bool:
+        try:
+            if os.getsid(pid) == self.process.pid:
+                return True
+            return bool(psutil.Process(pid).environ().get(TOKEN) == self._token)
+        except (OSError, psutil.Error):
+            return False
+
+
+def spawn(
+    argv: Sequence[str],
+    *,
+    cwd: Path,
+    env: Mapping[str, str] | None,
+    stdin: Pipe,
+    stdout: Pipe,
+    stderr: Pipe,
+    output_mb: int,
+    cpu_s: float | None = None,
+) -> ProcessTree:
+    """Starts `argv` (no shell) as the leader of its own session, with limits on Linux.
+
+    No file that it writes may grow beyond `output_mb`, it dumps no core, and it may use `cpu_s`
+    of processor time, which also ends it should we be killed and unable to. The limits are set
+    on the running process, since code between fork and exec is not safe beside threads. macOS
+    cannot do that and goes without them; time and memory are watched there all the same.
+
+    Raises RendererMissing where `argv[0]` cannot be found or is no program, RendererFailed where
+    it cannot be started.
+    """
+    token = secrets.token_hex(8)
+    before = set(psutil.pids())
+    try:
+        process = subprocess.Popen(
+            list(argv),
+            cwd=cwd,
+            env={**(os.environ if env is None else env), TOKEN: token},
+            stdin=stdin,
+            stdout=stdout,
+            stderr=stderr,
+            start_new_session=True,
+        )
+    except (FileNotFoundError, PermissionError, NotADirectoryError) as error:
+        if not cwd.is_dir():
+            raise RendererFailed(f"cannot be started: no folder {cwd}") from error
+        raise RendererMissing(f"cannot run {argv[0]!r}: {error.strerror}") from error
+    except (OSError, ValueError) as error:
+        raise RendererFailed(f"cannot start {argv[0]!r}: {error}") from error
+    _limit(process.pid, output_mb, cpu_s)
+    return ProcessTree(process, token, before)
+
+
+def _limit(pid: int, output_mb: int, cpu_s: float | None) -> None:
+    if sys.platform != "linux":
+        return
+    import resource
+
+    limits = {resource.RLIMIT_FSIZE: output_mb * 2**20, resource.RLIMIT_CORE: 0}
+    if cpu_s is not None:
+        limits[resource.RLIMIT_CPU] = int(cpu_s) + 1
+    for limit, value in limits.items():
+        _, hard = resource.prlimit(pid, limit)
+        value = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        with contextlib.suppress(ProcessLookupError, PermissionError, ValueError):
+            resource.prlimit(pid, limit, (value, value))
