@@ -1,11 +1,12 @@
-"""Where the files that come with snellcheck are: in a checkout, or inside an installed wheel.
+"""Where the files that come with snellcheck are, and where it keeps what it can make again.
 
-The wheel carries them in `harness/_data`; a checkout, and an editable installation of it, has
-them beside the packages.
+The wheel carries its files in `harness/_data`; a checkout, and an editable installation of it,
+has them beside the packages.
 """
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -24,3 +25,12 @@ def scenes_root() -> Path:
 def references_root() -> Path:
     """The folder of the approved baselines that come with snellcheck."""
     return _root("references")
+
+
+def cache_root() -> Path:
+    """The folder of what can be made again; ``SNELLCHECK_CACHE`` moves it. It may not exist yet."""
+    if chosen := os.environ.get("SNELLCHECK_CACHE"):
+        return Path(chosen).expanduser()
+    import platformdirs
+
+    return platformdirs.user_cache_path("snellcheck")
