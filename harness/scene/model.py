@@ -25,7 +25,8 @@ Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z][A-Z
 
 
 class Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    # strict: "1.5" and true are no numbers.
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 # --- shapes -------------------------------------------------------------------------------------

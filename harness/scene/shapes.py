@@ -1,0 +1,210 @@
+"""Shapes of a scene file as shapes of numbers: boxes, slabs and prisms become convex solids.
+
+Every function raises SceneInvalid with key paths relative to the shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from harness.scene import model, resolved
+from harness.scene.degrees import cosd, sind
+from harness.scene.findings import Finding, SceneInvalid, quoted
+from harness.scene.resolved import Vec3
+from harness.scene.vectors import (
+    IDENTITY,
+    Matrix,
+    any_frame,
+    combination,
+    exact_dot,
+    frame,
+    product,
+    rotation,
+    turned,
+)
+
+X, Y, Z = IDENTITY
+Faces = Sequence[tuple[int, ...]]
+
+# Corner k of a box has its coordinate i at + where bit i of k is set.
+BOX_FACES: Faces = (
+    (0, 4, 6, 2),  # -x
+    (1, 3, 7, 5),  # +x
+    (0, 1, 5, 4),  # -y
+    (2, 6, 7, 3),  # +y
+    (0, 2, 3, 1),  # -z
+    (4, 5, 7, 6),  # +z
+)
+# Corners of a prism: apex, entry side, exit side of the base; first at -y, then at +y.
+PRISM_FACES: Faces = (
+    (0, 1, 4, 3),  # entry
+    (0, 3, 5, 2),  # exit
+    (1, 2, 5, 4),  # base
+    (0, 2, 1),  # -y
+    (3, 4, 5),  # +y
+)
+
+
+def solid_shape(shape: model.SolidShape, folder: Path) -> resolved.SolidShape:
+    """The shape of a solid; `folder` is the scene file's, where mesh files are."""
+    match shape:
+        case model.Sphere():
+            return resolved.Sphere(center=_vec(shape.center), radius=shape.radius)
+        case model.Box() | model.Slab() | model.Prism():
+            return _convex(shape)
+        case model.AsMesh():
+            return polygons(_convex(shape.of))
+        case model.Cylinder():
+            return _cylinder(shape)
+        case _:
+            from harness.scene.meshes import mesh_shape
+
+            return mesh_shape(shape, turn_of(shape), folder)
+
+
+def surface_shape(shape: model.SurfaceShape, folder: Path) -> resolved.SurfaceShape:
+    """The shape of a surface that bounds no medium."""
+    if isinstance(shape, model.Rectangle):
+        return rectangle(shape)
+    if isinstance(shape, model.Disk):
+        return resolved.Disk(frame=_face_frame(shape), radius=shape.radius)
+    return solid_shape(shape, folder)
+
+
+def rectangle(shape: model.Rectangle) -> resolved.Rectangle:
+    return resolved.Rectangle(frame=_face_frame(shape), size=shape.size)
+
+
+def turn_of(shape: model.Placed) -> Matrix:
+    """All rotations of a shape in one, the first in the list applied first."""
+    turn = IDENTITY
+    for index, step in enumerate(shape.rotate):
+        matrix = rotation(_vec(step.axis), step.angle)
+        if matrix is None:
+            raise _no_direction(("rotate", index, "axis"), step.axis)
+        turn = product(matrix, turn)
+    return turn
+
+
+def _vec(values: tuple[float, float, float]) -> Vec3:
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
+def _no_direction(path: tuple[str | int, ...], value: Vec3) -> SceneInvalid:
+    return SceneInvalid(
+        Finding(path, "has no direction", quoted(list(value)), "a vector other than zero")
+    )
+
+
+def _turned_frame(base: resolved.Frame, turn: Matrix) -> resolved.Frame:
+    return resolved.Frame(
+        origin=base.origin, x=turned(turn, base.x), y=turned(turn, base.y), z=turned(turn, base.z)
+    )
+
+
+def _face_frame(shape: model.Rectangle | model.Disk) -> resolved.Frame:
+    if not any(shape.normal):
+        raise _no_direction(("normal",), shape.normal)
+    base = frame(_vec(shape.center), _vec(shape.normal), _vec(shape.up))
+    if base is None:
+        raise SceneInvalid(
+            Finding(
+                ("up",) if "up" in shape.model_fields_set else ("normal",),
+                "up is zero or parallel to normal, so the face has no orientation",
+                f"normal = {quoted(list(shape.normal))}, up = {quoted(list(shape.up))}",
+                "an up across the normal, such as [0, 0, -1] for a floor",
+            )
+        )
+    return _turned_frame(base, turn_of(shape))
+
+
+def _cylinder(shape: model.Cylinder) -> resolved.Cylinder:
+    base = any_frame(_vec(shape.center), _vec(shape.axis))
+    if base is None:
+        raise _no_direction(("axis",), shape.axis)
+    placed = _turned_frame(base, turn_of(shape))
+    return resolved.Cylinder(frame=placed, radius=shape.radius, height=shape.height)
+
+
+# --- convex solids --------------------------------------------------------------------------------
+
+
+def _convex(shape: model.Box | model.Slab | model.Prism) -> resolved.Convex:
+    match shape:
+        case model.Box():
+            placed = resolved.Frame(origin=_vec(shape.center), x=X, y=Y, z=Z)
+            half = tuple(extent / 2 for extent in shape.size)
+            return _box(_turned_frame(placed, turn_of(shape)), half, (-half[2], half[2]))
+        case model.Slab():
+            base = any_frame(_vec(shape.center), _vec(shape.normal))
+            if base is None:
+                raise _no_direction(("normal",), shape.normal)
+            return slab(_turned_frame(base, turn_of(shape)), shape.size, shape.thickness)
+        case model.Prism():
+            return _prism(shape)
+
+
+def slab(
+    front: resolved.Frame, size: tuple[float, float], thickness: float
+) -> resolved.Convex:
+    """The box of `thickness` behind the face that `front` is the frame of."""
+    return _box(front, tuple(extent / 2 for extent in size), (-thickness, 0.0))
+
+
+def _box(
+    placed: resolved.Frame, half: tuple[float, ...], along_z: tuple[float, float]
+) -> resolved.Convex:
+    axes = (placed.x, placed.y, placed.z)
+    ranges = ((-half[0], half[0]), (-half[1], half[1]), along_z)
+    corners = [
+        combination(placed.origin, [ranges[i][corner >> i & 1] for i in range(3)], axes)
+        for corner in range(8)
+    ]
+    normals = [direction for axis in axes for direction in (_opposite(axis), axis)]
+    return _polyhedron(corners, BOX_FACES, normals)
+
+
+def _prism(shape: model.Prism) -> resolved.Convex:
+    turn = turn_of(shape)
+    sine, cosine = sind(shape.apex_angle / 2), cosd(shape.apex_angle / 2)
+    axes = (turned(turn, X), turned(turn, Y), turned(turn, Z))
+    depth, spread = shape.side * cosine, shape.side * sine
+    outline = ((0.0, 0.0), (-depth, spread), (-depth, -spread))  # x, z
+    corners = [
+        combination(_vec(shape.apex), (x, y, z), axes)
+        for y in (-shape.length / 2, shape.length / 2)
+        for x, z in outline
+    ]
+    normals = [
+        turned(turn, (sine, 0.0, cosine)),
+        turned(turn, (sine, 0.0, -cosine)),
+        _opposite(axes[0]),
+        _opposite(axes[1]),
+        axes[1],
+    ]
+    return _polyhedron(corners, PRISM_FACES, normals)
+
+
+def _opposite(a: Vec3) -> Vec3:
+    return 0.0 - a[0], 0.0 - a[1], 0.0 - a[2]
+
+
+def _polyhedron(
+    vertices: Sequence[Vec3], faces: Faces, normals: Sequence[Vec3]
+) -> resolved.Convex:
+    """Planes through the rounded vertices: each lies midway between those of its face."""
+    planes = []
+    for face, normal in zip(faces, normals, strict=True):
+        distances = [exact_dot(normal, vertices[k]) for k in face]
+        planes.append((*normal, float((min(distances) + max(distances)) / 2)))
+    return resolved.Convex(planes=tuple(planes), vertices=tuple(vertices), faces=tuple(faces))
+
+
+def polygons(shape: resolved.Convex) -> resolved.Mesh:
+    """The same solid as triangles: each face a fan around its first vertex."""
+    triangles = tuple(
+        (face[0], face[k], face[k + 1]) for face in shape.faces for k in range(1, len(face) - 1)
+    )
+    return resolved.Mesh(vertices=shape.vertices, triangles=triangles)
