@@ -26,6 +26,7 @@ class Capability(enum.StrEnum):
     IMAGE = "image"  # can write images
     RAYS = "rays"  # offers trace()
     PIXEL_CENTRES = "pixel-centres"  # samples exactly the pixel centre; no noise
+    DOUBLE = "double"  # float64 arithmetic; others are taken to be float32
     LOBE_SWITCH = "lobe-switch"  # honours transport.reflection / .transmission
     SPHERE = "sphere"  # analytic, not tessellated
     CONVEX = "convex"

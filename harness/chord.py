@@ -1,0 +1,135 @@
+"""Where a line enters and leaves a convex solid, in closed form and in numpy.
+
+The truth's own geometry: written apart from the tracer's, so that a mistake in one is not a mistake
+in both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.expected import Float
+from harness.scene.resolved import Convex, Cylinder, Mesh, Solid, Sphere
+
+
+@dataclass(frozen=True)
+class Chord:
+    """Where lines enter and leave a convex solid; t_in > t_out where they miss it."""
+
+    t_in: Float
+    t_out: Float
+    n_in: Float
+    n_out: Float
+
+
+def _sphere_chord(sphere: Sphere, o: Float, d: Float) -> Chord:
+    oc = o - np.array(sphere.center)
+    b = np.einsum("ij,ij->i", oc, d)
+    closest = oc - b[:, None] * d
+    # r^2 - |closest|^2 loses nothing to |oc|^2, unlike the textbook b^2 - c.
+    h2 = sphere.radius**2 - np.einsum("ij,ij->i", closest, closest)
+    h = np.sqrt(np.maximum(h2, 0))
+    t_in, t_out = np.where(h2 > 0, -b - h, np.inf), np.where(h2 > 0, -b + h, -np.inf)
+    finite = np.where(h2 > 0, h, 0.0)[:, None]
+    n_in = (closest - finite * d) / sphere.radius
+    n_out = (closest + finite * d) / sphere.radius
+    return Chord(t_in, t_out, n_in, n_out)
+
+
+def _planes_chord(planes: Float, o: Float, d: Float, chunk: int = 2_000_000) -> Chord:
+    """`planes` (k, 4) as n . p <= w. Works through `chunk` plane-ray pairs at a time."""
+    m = len(o)
+    out = [np.empty(m), np.empty(m), np.empty((m, 3)), np.empty((m, 3))]
+    step = max(1, chunk // len(planes))
+    for start in range(0, m, step):
+        rows = slice(start, start + step)
+        slope = d[rows] @ planes[:, :3].T
+        height = planes[:, 3] - o[rows] @ planes[:, :3].T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = height / slope
+        entering = np.where(slope < 0, t, np.where((slope == 0) & (height < 0), np.inf, -np.inf))
+        leaving = np.where(slope > 0, t, np.inf)
+        first, last = entering.argmax(1), leaving.argmin(1)
+        index = np.arange(len(first))
+        out[0][rows], out[1][rows] = entering[index, first], leaving[index, last]
+        out[2][rows], out[3][rows] = planes[first, :3], planes[last, :3]
+    return Chord(*out)
+
+
+def _cylinder_chord(cylinder: Cylinder, o: Float, d: Float) -> Chord:
+    frame = cylinder.frame
+    axes = np.array([frame.x, frame.y, frame.z])
+    lo, ld = (o - np.array(frame.origin)) @ axes.T, d @ axes.T
+    a = ld[:, 0] ** 2 + ld[:, 1] ** 2
+    b = lo[:, 0] * ld[:, 0] + lo[:, 1] * ld[:, 1]
+    cross = lo[:, 0] * ld[:, 1] - lo[:, 1] * ld[:, 0]
+    h2 = a * cylinder.radius**2 - cross**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        h = np.sqrt(np.maximum(h2, 0))
+        side_in, side_out = (-b - h) / a, (-b + h) / a
+    inside = lo[:, 0] ** 2 + lo[:, 1] ** 2 < cylinder.radius**2
+    parallel = a == 0
+    side_in = np.where(
+        parallel, np.where(inside, -np.inf, np.inf), np.where(h2 > 0, side_in, np.inf)
+    )
+    side_out = np.where(parallel, np.inf, np.where(h2 > 0, side_out, -np.inf))
+    half = cylinder.height / 2
+    caps = _planes_chord(
+        np.array([[*frame.z, half + np.dot(frame.z, frame.origin)],
+                  [*(-np.array(frame.z)), half - np.dot(frame.z, frame.origin)]]), o, d
+    )  # fmt: skip
+
+    def side_normal(t: Float) -> Float:
+        local = lo + np.where(np.isfinite(t), t, 0.0)[:, None] * ld
+        local[:, 2] = 0
+        return np.asarray(local / cylinder.radius @ axes)
+
+    through_cap_in, through_cap_out = caps.t_in > side_in, caps.t_out < side_out
+    return Chord(
+        np.maximum(caps.t_in, side_in),
+        np.minimum(caps.t_out, side_out),
+        np.where(through_cap_in[:, None], caps.n_in, side_normal(side_in)),
+        np.where(through_cap_out[:, None], caps.n_out, side_normal(side_out)),
+    )
+
+
+def _mesh_planes(mesh: Mesh) -> Float:
+    """The planes of a convex flat-shaded mesh. Raises ValueError where it is not convex."""
+    if mesh.normals is not None:
+        raise ValueError("a smoothly shaded mesh has no closed form")
+    vertices, triangles = np.array(mesh.vertices), np.array(mesh.triangles)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    n = np.cross(b - a, c - a)
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    planes = np.column_stack([n, np.einsum("ij,ij->i", n, a)])
+    size = np.ptp(vertices, axis=0).max()
+    for rows in np.array_split(planes, max(1, len(planes) // 256)):
+        if (rows[:, :3] @ vertices.T - rows[:, 3:]).max() > 1e-12 * size:
+            raise ValueError("the mesh is not convex")
+    return planes
+
+
+class Body:
+    """A solid of the scene with its chord function prepared once."""
+
+    def __init__(self, solid: Solid) -> None:
+        self.solid = solid
+        shape = solid.shape
+        self._planes = (
+            np.array(shape.planes)
+            if isinstance(shape, Convex)
+            else _mesh_planes(shape)
+            if isinstance(shape, Mesh)
+            else None
+        )
+
+    def chord(self, o: Float, d: Float) -> Chord:
+        shape = self.solid.shape
+        if isinstance(shape, Sphere):
+            return _sphere_chord(shape, o, d)
+        if isinstance(shape, Cylinder):
+            return _cylinder_chord(shape, o, d)
+        assert self._planes is not None
+        return _planes_chord(self._planes, o, d)

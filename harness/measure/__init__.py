@@ -1,0 +1,1 @@
+"""From images and ray paths to figures, each with its expectation and tolerance."""

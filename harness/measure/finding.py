@@ -1,0 +1,30 @@
+"""What a measurement says: a value, what physics expects, how far apart they may be and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from harness.record import Curve
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One observable of one renderer. `within` is the verdict on all rays or pixels.
+
+    `value`, `expected` and `tolerance` are those of the ray or pixel that comes closest to its
+    limit or oversteps it most, in the observable's unit, so that |value - expected| <= tolerance says the same as `within`
+    unless `fault` names what else is wrong (rays missing, light where there should be none).
+    """
+
+    value: float
+    expected: float
+    tolerance: float
+    within: bool
+    derivation: str
+    fault: str = ""
+    detail: dict[str, float | int | str] = field(default_factory=dict)
+    curve: Curve | None = None
+
+
+class Unmeasurable(Exception):
+    """Nothing could be measured; the message says why. The check becomes an ERROR."""

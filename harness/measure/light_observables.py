@@ -1,0 +1,177 @@
+"""Observables of light: what part of it takes a path, and where it stops doing so.
+
+The probe shows radiance 1 on its plane and black elsewhere, so a pixel is the weight of the path:
+the product of its Fresnel factors and what absorption leaves.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness import expected
+from harness.expected import Float
+from harness.measure.curves import curve_of_rows
+from harness.measure.finding import Finding, Unmeasurable
+from harness.measure.probe_truth import ProbeTruth
+from harness.probe.decode import lit_threshold
+from harness.renderers.base import Status
+
+# Pixels per bin where the renderer samples: enough for the mean's error to be normal.
+BIN = 256
+
+
+def path_weight(
+    truth: ProbeTruth, pixels: NDArray[np.float32], epsilon: float, quantum: float, n2: bool
+) -> Finding:
+    """Reflectance or transmittance of the path, per pixel, of a renderer without noise.
+
+    `n2` says that the renderer's radiance scales with the square of the index: then light that was
+    emitted in one medium and seen in another carries the ratio of the two.
+    """
+    measured = pixels.reshape(-1, 3).astype(np.float64)
+    true, used = _expected_level(truth, n2)
+    error = np.abs(measured - true)
+    tolerance = (quantum + truth.level_tolerance(epsilon) * true.max(axis=1, initial=1))[:, None]
+    tolerance = np.broadcast_to(tolerance, error.shape)
+    if not np.isfinite(error[used]).all():
+        raise Unmeasurable("a measured pixel is not finite")
+    ratio = np.where(used[:, None], error / tolerance, -np.inf)
+    k, channel = np.unravel_index(int(ratio.argmax()), ratio.shape)
+    width = truth.scene.film.width
+    detail: dict[str, float | int | str] = {
+        "max": float(error[used].max()), "rms": float(np.sqrt(np.mean(error[used] ** 2))),
+        "p999": float(np.quantile(error[used], 0.999)), "rays": int(used.sum()),
+        "excluded_grazing": int(truth.grazing.sum()), "channel": "rgb"[int(channel)],
+        "worst_pixel_x": int(k % width), "worst_pixel_y": int(k // width),
+        "worst_theta_i_deg": float(np.degrees(truth.theta_i[k])),
+    }  # fmt: skip
+    curve = curve_of_rows(
+        truth, used, "Weight of the path", "weight (green)",
+        measured[:, 1], true[:, 1], tolerance[:, 1],
+    )  # fmt: skip
+    return Finding(
+        float(measured[k, channel]), float(true[k, channel]), float(tolerance[k, channel]),
+        bool(np.all(error[used] <= tolerance[used])),
+        "quantum of the image + 8 eps per rounding chain x condition of the Fresnel factors",
+        detail=detail, curve=curve,
+    )  # fmt: skip
+
+
+def sampled_path_weight(
+    truth: ProbeTruth, pixels: NDArray[np.float32], level: float, n2: bool
+) -> Finding:
+    """The same for a renderer that samples its lobes: means over bins of like angle.
+
+    Each bin's standard error comes from the scatter of its own pixels. `level` is the chance of a
+    false alarm over all bins together (Šidák), judged by Student's t.
+    """
+    from scipy.stats import t as student
+
+    measured = pixels.reshape(-1, 3).astype(np.float64)
+    true, used = _expected_level(truth, n2)
+    rows = np.flatnonzero(used)
+    if len(rows) < BIN:
+        raise Unmeasurable(f"{len(rows)} pixels are too few: a bin needs {BIN}")
+    order = rows[np.argsort(truth.theta_i[rows])]
+    bins = np.array_split(order, max(1, len(order) // BIN))
+    residual = np.array([(measured[b] - true[b]).mean(axis=0) for b in bins])
+    scatter = [(measured[b] - true[b]).std(axis=0, ddof=1) / np.sqrt(len(b)) for b in bins]
+    per_test = 1 - (1 - level) ** (1 / residual.size)
+    limit = student.isf(per_test / 2, BIN - 1)
+    # A bin in which every sample fell alike has no scatter; one sample in the bin could differ.
+    error = np.maximum(np.array(scatter), 1 / (BIN * 64)) * limit
+    k, channel = np.unravel_index(int((np.abs(residual) / error).argmax()), residual.shape)
+    theta = np.array([np.degrees(truth.theta_i[b]).mean() for b in bins])
+    return Finding(
+        float(measured[bins[k], channel].mean()), float(true[bins[k], channel].mean()),
+        float(error[k, channel]), bool(np.all(np.abs(residual) <= error)),
+        f"{limit:.2f} standard errors of a bin's mean: Student's t, {BIN - 1} degrees of freedom, "
+        f"family-wise level {level:g} over {residual.size} bins",
+        detail={"max": float(np.abs(residual).max()), "rms": float(np.sqrt((residual**2).mean())),
+                "bins": len(bins), "rays": len(rows), "worst_theta_i_deg": float(theta[k])},
+    )  # fmt: skip
+
+
+def critical_angle(truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float) -> Finding:
+    """Angle of incidence at which light stops passing, degrees, between lit and dark pixels."""
+    ior = [medium.ior for medium in truth.scene.media]
+    solid = truth.scene.solids[0]
+    closed = expected.critical_angle(ior[solid.medium], ior[solid.exterior])
+    return _boundary(truth, pixels, quantum, closed, lit_below=True)
+
+
+def first_transmitting_angle(
+    truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float
+) -> Finding:
+    """Smallest angle of incidence at which a prism transmits, degrees, in its principal plane."""
+    from harness.measure.ray_observables import apex_angle, principal
+
+    used = principal(truth) & (truth.paths.status == Status.HIT)
+    if not used.any():
+        raise Unmeasurable("no ray of the middle row lies in the prism's principal plane")
+    ior = [medium.ior for medium in truth.scene.media]
+    solid = truth.scene.solids[0]
+    closed = expected.prism_first_transmitting_angle(
+        apex_angle(truth, used), ior[solid.medium] / ior[solid.exterior]
+    )
+    return _boundary(truth, pixels, quantum, closed, lit_below=False)
+
+
+def _boundary(
+    truth: ProbeTruth,
+    pixels: NDArray[np.float32],
+    quantum: float,
+    closed: float,
+    lit_below: bool,
+) -> Finding:
+    """Where the middle row turns from lit to dark, against the closed form.
+
+    The angle is known to half the distance between the last lit and the first dark ray. A ray so
+    near the limit that it carries less light than the image can show looks dark, so the true curve
+    is put through the same threshold.
+    """
+    light = pixels.reshape(-1, 3).min(axis=1).astype(np.float64)
+    threshold = lit_threshold(quantum)
+    known = np.isin(truth.paths.status, (Status.HIT, Status.TIR))
+    rows = np.flatnonzero(truth.central_row & known)
+    theta = truth.theta_i[rows]
+    rows, theta = rows[np.argsort(theta)], np.sort(theta)
+    near = np.abs(theta - closed) < np.radians(10)
+    rows, theta = rows[near], theta[near]
+    lit = light[rows] > threshold
+    if not lit.any() or lit.all():
+        raise Unmeasurable("the middle row is not lit on one side of the limit only")
+    below, above = (lit, ~lit) if lit_below else (~lit, lit)
+    low, high = theta[below].max(), theta[above].min()
+    value = (low + high) / 2
+    level = truth.paths.weight[rows]
+    shown = np.where(np.isfinite(level), level, 0) > threshold
+    faint = (truth.paths.status[rows] == Status.HIT) & ~shown
+    tolerance = (high - low) / 2 + (np.ptp(theta[faint]) if faint.sum() > 1 else 0)
+    spacing = float(np.abs(np.diff(theta)).max())
+    tolerance = max(float(tolerance), spacing / 2) + (spacing if faint.any() else 0)
+    ordered = bool(low < high)
+    within = ordered and abs(value - closed) <= tolerance
+    return Finding(
+        float(np.degrees(value)), float(np.degrees(closed)), float(np.degrees(tolerance)), within,
+        "half the distance between the rays on both sides of the limit, and the width of the band "
+        "in which the true light is below 4 quanta",
+        "" if ordered else "lit and dark rays alternate around the limit",
+        {"last_below_deg": float(np.degrees(low)), "first_above_deg": float(np.degrees(high)),
+         "rays": len(rows), "faint": int(faint.sum())},
+    )  # fmt: skip
+
+
+def _expected_level(truth: ProbeTruth, n2: bool) -> tuple[Float, NDArray[np.bool_]]:
+    """(m, 3) true pixel values and the rays that count, dark ones among them."""
+    landed = truth.landings[0].status == Status.HIT
+    used = ~truth.grazing
+    if not (used & landed).any():
+        raise Unmeasurable("no ray takes this path to the plane")
+    scale = np.ones(len(landed))
+    if n2:
+        ior = np.array([medium.ior for medium in truth.scene.media])
+        scale = (ior[truth.scene.camera.medium] / ior[truth.paths.medium]) ** 2
+    level = np.nan_to_num(truth.level) * scale[:, None]
+    return np.where(landed[:, None], level, 0.0), used

@@ -1,0 +1,313 @@
+"""Observables of single rays: each compares one renderer's rays with their truth.
+
+Every function takes the truth and the measurement of the same rays, the relative precision
+`epsilon` of the renderer's arithmetic, and returns a `Finding`. Rays that graze an edge are left
+out and counted; a ray that should arrive and does not, or the other way round, is a fault.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness import expected
+from harness.expected import Float
+from harness.measure.curves import curve_of_rows
+from harness.measure.finding import Finding, Unmeasurable
+from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
+from harness.measure.rays import RayMeasurement
+from harness.record import Curve
+from harness.renderers.base import Status
+
+
+def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+    """Distance between measured and true landing point on the first plane, scene units."""
+    used, fault, counts = _used(truth, rays)
+    error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1)
+    tolerance = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    vector = (rays.point - truth.landings[0].point)[_worst(error, tolerance, used)]
+    detail = counts | {f"worst_d{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
+    return _finding(
+        truth, error, 0.0, tolerance, used, fault, detail,
+        _derivation(rays, "8 eps per rounding chain x condition of the landing point"),
+        curve_of_rows(
+            truth, used, "Exit point", "error (units)", error, np.zeros_like(error), tolerance
+        ),
+    )  # fmt: skip
+
+
+def exit_direction(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+    """Angle between measured and true direction after the last interface, microradians."""
+    direction = _direction(rays)
+    used, fault, counts = _used(truth, rays)
+    error = _angle(direction, truth.paths.direction) * 1e6
+    tolerance = (rays.direction_uncertainty + truth.direction_tolerance(epsilon)) * 1e6
+    return _finding(
+        truth, error, 0.0, tolerance, used, fault, counts,
+        _derivation(rays, "8 eps per rounding chain x condition of the direction"),
+        curve_of_rows(
+            truth, used, "Exit direction", "error (µrad)", error, np.zeros_like(error), tolerance
+        ),
+    )  # fmt: skip
+
+
+def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+    """Angle of refraction inside the medium, degrees, against asin(ior_i sin(theta_i) / ior_t).
+
+    The plane must be immersed: the ray's way from the true point of entry to its landing point is
+    the way inside, which every black box shows.
+    """
+    used, fault, counts = _used(truth, rays)
+    n = truth.paths.n[:, 0]
+    way = rays.point - truth.paths.interface[:, 0]
+    length = np.linalg.norm(way, axis=1)
+    measured = _angle(way / length[:, None], -n)
+    ior_i, ior_t = _indices(truth)
+    true = expected.snell_angle(truth.theta_i, ior_i, ior_t)
+    shift = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    tolerance = np.degrees(shift / length)
+    return _finding(
+        truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
+        _derivation(rays, "tolerance of the landing point / length of the way inside"),
+        curve_of_rows(
+            truth, used, "Angle of refraction", "angle of refraction (°)",
+            np.degrees(measured), np.degrees(true), tolerance,
+        ),
+    )  # fmt: skip
+
+
+def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+    """Sideways shift of the ray by a parallel slab, scene units, positive as glass shifts it.
+
+    Measured against the line of the incident ray; the truth is the closed form for the slab's
+    thickness, read from the distance between its faces along the normal.
+    """
+    used, fault, counts = _used(truth, rays)
+    d, n = truth.rays.directions, truth.paths.n[:, 0]
+    shift = rays.point - truth.paths.interface[:, 0]
+    shift = shift - np.einsum("ij,ij->i", shift, d)[:, None] * d
+    # The shift is towards the normal's side of the undeviated ray: along -(n - (n.d) d).
+    side = -(n - np.einsum("ij,ij->i", n, d)[:, None] * d)
+    length = np.linalg.norm(side, axis=1)
+    upright = length < 1e-9
+    side = side / np.where(upright, 1.0, length)[:, None]
+    offset = np.where(upright, np.linalg.norm(shift, axis=1), np.einsum("ij,ij->i", shift, side))
+    inside = truth.paths.interface[:, 1] - truth.paths.interface[:, 0]
+    thickness = float(np.median(np.abs(np.einsum("ij,ij->i", inside, n))[used]))
+    ior_i, ior_t = _indices(truth)
+    true = expected.slab_offset(truth.theta_i, thickness, ior_t / ior_i)
+    tolerance = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    worst = np.abs(offset - true)[used].max()
+    counts |= {"thickness": thickness, "max_relative_to_thickness": float(worst / thickness)}
+    return _finding(
+        truth, offset, true, tolerance, used, fault, counts,
+        _derivation(rays, "the offset moves no more than the landing point"),
+        curve_of_rows(truth, used, "Slab offset", "offset (units)", offset, true, tolerance),
+    )  # fmt: skip
+
+
+def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+    """Deviation by a prism in its principal plane, degrees; the image's middle row lies in it."""
+    direction = _direction(rays)
+    used, fault, counts = _used(truth, rays)
+    used = used & principal(truth)
+    if not used.any():
+        raise Unmeasurable("no ray of the middle row lies in the prism's principal plane")
+    apex = apex_angle(truth, used)
+    ior_i, ior_t = _indices(truth)
+    measured = _angle(direction, truth.rays.directions)
+    true = np.abs(expected.prism_deviation(signed_incidence(truth), apex, ior_t / ior_i))
+    tolerance = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(epsilon))
+    counts |= {"apex_deg": float(np.degrees(apex))}
+    return _finding(
+        truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
+        _derivation(rays, "tolerance of the exit direction"),
+        curve_of_rows(
+            truth, used, "Deviation", "deviation (°)",
+            np.degrees(measured), np.degrees(true), tolerance,
+        ),
+    )  # fmt: skip
+
+
+def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+    """Smallest deviation of the curve, degrees, by a parabola through its lowest samples.
+
+    The same estimate on the true curve at the same angles tells the estimate's own error, which is
+    taken off.
+    """
+    direction = _direction(rays)
+    used, fault, counts = _used(truth, rays)
+    used = used & principal(truth)
+    if used.sum() < 7:
+        raise Unmeasurable("fewer than 7 rays lie in the prism's principal plane")
+    apex = apex_angle(truth, used)
+    ior_i, ior_t = _indices(truth)
+    theta = signed_incidence(truth)[used]
+    true_curve = expected.prism_deviation(theta, apex, ior_t / ior_i)
+    closed = np.degrees(expected.prism_minimum_deviation(apex, ior_t / ior_i))
+    bias = _vertex(theta, np.degrees(true_curve)) - closed
+    value = _vertex(theta, np.degrees(_angle(direction, truth.rays.directions)[used])) - bias
+    bound = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(epsilon))[used]
+    tolerance = 3 * float(bound[np.argsort(np.abs(true_curve - true_curve.min()))[:7]].max())
+    return Finding(
+        value, float(closed), tolerance, bool(abs(value - closed) <= tolerance) and not fault,
+        "tolerance of the deviation x 3, the norm of the parabola's vertex over seven samples; "
+        f"the estimate's own error {bias:.1e} deg is taken off", fault,
+        counts | {"estimator_bias_deg": float(bias)},
+    )  # fmt: skip
+
+
+def tir(truth: ProbeTruth, rays: RayMeasurement, _epsilon: float) -> Finding:
+    """Rays lit where there is total internal reflection, or dark where light must pass."""
+    fate = truth.paths.status
+    clear = ~truth.grazing & ~rays.faint & np.isin(fate, (Status.HIT, Status.TIR))
+    if not (clear & (fate == Status.TIR)).any() or not (clear & (fate == Status.HIT)).any():
+        raise Unmeasurable("the probe does not hold both transmitted and totally reflected rays")
+    on_plane = truth.landings[0].status == Status.HIT
+    lit = rays.seen | rays.undecided
+    leaked = clear & (fate == Status.TIR) & lit
+    lost = clear & (fate == Status.HIT) & on_plane & ~lit
+    wrong = int(leaked.sum() + lost.sum())
+    detail: dict[str, float | int | str] = {
+        "rays": int(clear.sum()), "lit_beyond_critical": int(leaked.sum()),
+        "dark_below_critical": int(lost.sum()), "excluded_near_critical": int((~clear).sum()),
+        "method": rays.method,
+    }  # fmt: skip
+    return Finding(
+        wrong, 0, 0, wrong == 0,
+        "a count: rays within the probe's resolution of the critical angle are left out",
+        detail=detail,
+    )  # fmt: skip
+
+
+# --- geometry of a prism --------------------------------------------------------------------------
+
+
+def principal(truth: ProbeTruth) -> NDArray[np.bool_]:
+    """Rays whose direction is perpendicular to the prism's apex edge, to rounding."""
+    n1, n2 = truth.paths.n[:, 0], truth.paths.n[:, -1]
+    edge = np.cross(n1, n2)
+    length = np.linalg.norm(edge, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = np.abs(np.einsum("ij,ij->i", edge, truth.rays.directions)) / length
+    return np.asarray(np.nan_to_num(along, nan=1.0) < 1e-12)
+
+
+def apex_angle(truth: ProbeTruth, used: NDArray[np.bool_]) -> float:
+    """Angle between the faces where the rays enter and leave, radians."""
+    n1, n2 = truth.paths.n[used, 0], truth.paths.n[used, -1]
+    return float(np.median(_angle(n1, n2)))
+
+
+def signed_incidence(truth: ProbeTruth) -> Float:
+    """Angle of incidence, positive where the ray comes from the base's side of the normal."""
+    n1, n2 = truth.paths.n[:, 0], truth.paths.n[:, -1]
+    edge = np.cross(n1, n2)
+    sense = np.einsum("ij,ij->i", np.cross(truth.rays.directions, n1), edge)
+    return np.asarray(np.where(sense > 0, 1.0, -1.0) * truth.theta_i)
+
+
+# --- shared ---------------------------------------------------------------------------------------
+
+
+def _used(
+    truth: ProbeTruth, rays: RayMeasurement
+) -> tuple[NDArray[np.bool_], str, dict[str, float | int | str]]:
+    """The rays that count, what is wrong with the others, and how many there are of each."""
+    landed = np.all([landing.status == Status.HIT for landing in truth.landings], axis=0)
+    nowhere = np.all([landing.status != Status.HIT for landing in truth.landings], axis=0)
+    owed = landed & ~truth.grazing & ~rays.faint
+    lost = owed & ~rays.seen
+    ghosts = nowhere & ~truth.grazing & (rays.seen | rays.undecided)
+    faults = []
+    if lost.any():
+        faults.append(f"{int(lost.sum())} of {int(owed.sum())} rays did not arrive")
+    if ghosts.any():
+        faults.append(f"{int(ghosts.sum())} pixels are lit that no ray should reach")
+    used = landed & ~truth.grazing & rays.seen
+    if not used.any():
+        raise Unmeasurable(
+            "no ray could be measured: " + ("; ".join(faults) or f"pixels: {rays.reasons}")
+        )
+    counts: dict[str, float | int | str] = {
+        "rays": int(used.sum()),
+        "lost": int(lost.sum()),
+        "ghosts": int(ghosts.sum()),
+        "excluded_grazing": int((landed & truth.grazing).sum()),
+        "excluded_faint": int((landed & rays.faint & ~rays.seen).sum()),
+        "method": rays.method,
+    }
+    return used, "; ".join(faults), counts
+
+
+def _direction(rays: RayMeasurement) -> Float:
+    if rays.direction is None:
+        raise Unmeasurable("one plane does not tell a direction; the probe needs two")
+    return rays.direction
+
+
+def _indices(truth: ProbeTruth) -> tuple[float, float]:
+    """Indices before and after the first interface."""
+    media, scene = truth.scene.media, truth.scene
+    solid = scene.solids[0]
+    inside = scene.camera.medium == solid.medium
+    beyond = solid.exterior if inside else solid.medium
+    return media[scene.camera.medium].ior, media[beyond].ior
+
+
+def _angle(a: Float, b: Float) -> Float:
+    """atan2(|a x b|, a . b): exact for small angles, where acos is not."""
+    return np.asarray(
+        np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
+    )
+
+
+def _worst(error: Float, tolerance: Float, used: NDArray[np.bool_]) -> int:
+    """The ray nearest to, or furthest beyond, its limit."""
+    ratio = np.where(used, error / tolerance, -np.inf)
+    return int(np.argmax(ratio))
+
+
+def _vertex(x: Float, y: Float) -> float:
+    """Minimum of the parabola fitted to the seven lowest samples."""
+    low = np.argsort(y)[:7]
+    center = x[low].mean()
+    a, b, c = np.polyfit(x[low] - center, y[low], 2)
+    return float(c - b * b / (4 * a))
+
+
+def _derivation(rays: RayMeasurement, arithmetic: str) -> str:
+    return f"quantum of the image through the {rays.method} + {arithmetic} ({ROUNDINGS} roundings)"
+
+
+def _finding(
+    truth: ProbeTruth,
+    value: Float,
+    true: Float | float,
+    tolerance: Float,
+    used: NDArray[np.bool_],
+    fault: str,
+    detail: dict[str, float | int | str],
+    derivation: str,
+    curve: Curve,
+) -> Finding:
+    wanted = np.broadcast_to(true, value.shape)
+    error = np.abs(value - wanted)
+    if not np.isfinite(error[used]).all() or not np.isfinite(tolerance[used]).all():
+        raise Unmeasurable("a measured ray or its tolerance is not finite")
+    k = _worst(error, tolerance, used)
+    width = truth.scene.film.width
+    detail = {
+        "max": float(error[used].max()),
+        "rms": float(np.sqrt(np.mean(error[used] ** 2))),
+        "p999": float(np.quantile(error[used], 0.999)),
+        "worst_pixel_x": int(k % width),
+        "worst_pixel_y": int(k // width),
+        "worst_theta_i_deg": float(np.degrees(truth.theta_i[k])),
+        **detail,
+    }
+    within = bool(np.all(error[used] <= tolerance[used])) and not fault
+    return Finding(
+        float(value[k]), float(wanted[k]), float(tolerance[k]), within, derivation, fault,
+        detail, curve,
+    )  # fmt: skip

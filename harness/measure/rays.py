@@ -1,0 +1,108 @@
+"""Where a renderer's rays went: from coded images, or from its ray API.
+
+Both give the same `RayMeasurement`, so everything after this point is one piece of code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.expected import Float
+from harness.measure.probe_truth import ProbeTruth
+from harness.probe.decode import Decoded, Reason, decode, lit_threshold
+from harness.probe.scenes import AMPLITUDE, AXES
+from harness.renderers.base import RayPaths, Status
+from harness.scene.resolved import Rectangle
+
+Images = Mapping[tuple[int, str], NDArray[np.float32]]
+
+
+@dataclass(frozen=True)
+class RayMeasurement:
+    """Of m rays: landing `point` (m, 3) on the first plane and `direction` (m, 3), NaN if unseen.
+
+    `seen` (m,) tells that the ray reached the plane; `undecided` (m,) that a pixel held light which
+    does not decode. `faint` (m,) marks rays whose light is too weak to be demanded. The
+    uncertainties (m,) are what the image's quantum alone allows: units and radians.
+    """
+
+    point: Float
+    direction: Float | None
+    seen: NDArray[np.bool_]
+    undecided: NDArray[np.bool_]
+    faint: NDArray[np.bool_]
+    point_uncertainty: Float
+    direction_uncertainty: Float
+    reasons: dict[str, int]
+    method: str
+
+
+def from_paths(paths: RayPaths) -> RayMeasurement:
+    """From a ray API: nothing is quantised."""
+    m = len(paths.status)
+    seen = paths.status == Status.HIT
+    names = {
+        Status(k).name.lower(): int((paths.status == k).sum()) for k in np.unique(paths.status)
+    }
+    none = np.zeros(m)
+    nothing = np.zeros(m, bool)
+    missing = ~seen[:, None]
+    return RayMeasurement(
+        np.where(missing, np.nan, paths.point), np.where(missing, np.nan, paths.direction),
+        seen, nothing, nothing, none, none, names, "ray API",
+    )  # fmt: skip
+
+
+def from_images(images: Images, truth: ProbeTruth, cells: int, quantum: float) -> RayMeasurement:
+    """From coded images keyed by (plane, axis). Two planes give the direction.
+
+    `quantum` is the largest error of the renderer's radiance values, from its preflight.
+    """
+    places = [
+        _place(images, index, plane, cells, quantum) for index, plane in enumerate(truth.planes)
+    ]
+    point, uncertainty, seen, undecided, reasons = places[0]
+    direction, direction_uncertainty = None, np.zeros(len(seen))
+    if len(places) == 2:
+        far, far_uncertainty, far_seen, far_undecided, _ = places[1]
+        gap = far - point
+        length = np.linalg.norm(gap, axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            # The way between the planes, whichever of the two comes first.
+            sign = np.sign(np.einsum("ij,ij->i", gap, truth.paths.direction))
+            direction = gap / length[:, None] * sign[:, None]
+            direction_uncertainty = (uncertainty + far_uncertainty) / length
+        seen, undecided = seen & far_seen, undecided | far_undecided
+    weakest = truth.paths.weight * truth.landings[0].transmission.min(axis=1) * AMPLITUDE
+    # `decode` needs slack <= 1/4 in the worst place of a cell; half of that light is not demanded.
+    needed = max(lit_threshold(quantum), 8 * quantum * (cells + 1))
+    return RayMeasurement(
+        point, direction, seen, undecided, weakest < 2 * needed, uncertainty,
+        direction_uncertainty, reasons, f"position code, {cells} cells",
+    )  # fmt: skip
+
+
+def _place(
+    images: Images, index: int, plane: Rectangle, cells: int, quantum: float
+) -> tuple[Float, Float, NDArray[np.bool_], NDArray[np.bool_], dict[str, int]]:
+    u, v = (decode(images[index, axis], cells, AMPLITUDE, quantum) for axis in AXES)
+    frame = plane.frame
+    width, height = plane.size
+    point = (
+        np.array(frame.origin)
+        + ((u.coordinate - 0.5) * width)[:, None] * np.array(frame.x)
+        + ((v.coordinate - 0.5) * height)[:, None] * np.array(frame.y)
+    )
+    uncertainty = np.hypot(u.uncertainty * width, v.uncertainty * height)
+    seen = (u.reason == Reason.OK) & (v.reason == Reason.OK)
+    dark = (u.reason == Reason.DARK) & (v.reason == Reason.DARK)
+    return point, uncertainty, seen, ~seen & ~dark, _count(u, v)
+
+
+def _count(u: Decoded, v: Decoded) -> dict[str, int]:
+    worst = np.maximum(u.reason, v.reason)
+    return {Reason(k).name.lower(): int((worst == k).sum()) for k in np.unique(worst)}

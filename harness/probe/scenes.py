@@ -1,0 +1,68 @@
+"""The scenes that isolate one path.
+
+A probe admits one path only, because codes of two paths in one pixel would mix: the world is black
+but for one plane, recursion is just deep enough for the path, and a position code needs no more
+than the lobes its path takes.
+"""
+
+from __future__ import annotations
+
+from harness.scene.resolved import (
+    Constant,
+    Emissive,
+    Mirror,
+    PositionCode,
+    Rectangle,
+    ResolvedScene,
+    Surface,
+    ThinSlab,
+)
+
+# Below 1, so that no rounding upwards can clip.
+AMPLITUDE = 0.9
+AXES = ("u", "v")
+
+
+def code_scene(
+    scene: ResolvedScene, plane: Rectangle, axis: str, cells: int, path: str
+) -> ResolvedScene:
+    """`scene` with nothing luminous but a position code along `axis` of `plane`.
+
+    Lobes that the path does not take are switched off where a renderer can: the weight does not
+    matter, because the code's constant channel divides it out.
+    """
+    pattern = PositionCode.model_validate({"axis": axis, "cells": cells, "amplitude": AMPLITUDE})
+    transport = {"reflection": "R" in path, "transmission": "T" in path or not path}
+    return _isolated(scene, plane, Emissive(pattern=pattern), path, transport)
+
+
+def light_scene(scene: ResolvedScene, plane: Rectangle, path: str) -> ResolvedScene:
+    """`scene` with nothing luminous but radiance 1 on `plane`: a pixel shows the path's weight.
+
+    Both lobes are followed, so that each carries its own Fresnel factor; the depth cuts the rest.
+    """
+    pattern = Constant(radiance=(1.0, 1.0, 1.0))
+    return _isolated(
+        scene, plane, Emissive(pattern=pattern), path, {"reflection": True, "transmission": True}
+    )
+
+
+def _isolated(
+    scene: ResolvedScene,
+    plane: Rectangle,
+    material: Emissive,
+    path: str,
+    lobes: dict[str, bool],
+) -> ResolvedScene:
+    kept = tuple(s for s in scene.surfaces if isinstance(s.material, Mirror | ThinSlab))
+    probe_plane = Surface(name="probe-plane", shape=plane, material=material)
+    # A probe measures one path whatever its weight, so nothing is cut by weight.
+    transport = {"max_depth": len(path) + 1, "min_weight": 0.0, **lobes}
+    return scene.model_copy(
+        update={
+            "surfaces": (*kept, probe_plane),
+            "lights": (),
+            "background": (0.0, 0.0, 0.0),
+            "transport": scene.transport.model_copy(update=transport),
+        }
+    )

@@ -1,0 +1,155 @@
+"""The truth of every measured ray: the closed forms of `harness.expected`, chained along a path.
+
+A path has a letter per interface, T for transmitted and R for reflected. Solids are convex and
+nested or apart, so each interface is one root of one line-solid intersection and nothing has to be
+searched or thresholded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.chord import Body, Chord
+from harness.expected import Float, fresnel, reflect, refract
+from harness.renderers.base import Rays, Status
+from harness.scene.resolved import Rectangle, ResolvedScene
+
+
+@dataclass(frozen=True)
+class TruePaths:
+    """What physics says of m rays after the last interface of their path.
+
+    `status` is HIT (not ended early), MISS (no such interface) or TIR. `origin` and `direction`
+    (m, 3) are the ray that leaves the last interface, in `medium` (m,). `weight` is the product of
+    the Fresnel factors and `absorbed` (m, 3) the optical depth so far. Per interface k:
+    `cos_theta_i` (m, letters), `interface` (m, letters, 3) and `n` (m, letters, 3) facing the ray.
+    `inside` (solids, m) says which solids the ray is in.
+    """
+
+    status: NDArray[np.int8]
+    origin: Float
+    direction: Float
+    medium: NDArray[np.intp]
+    weight: Float
+    absorbed: Float
+    cos_theta_i: Float
+    interface: Float
+    n: Float
+    inside: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Landing:
+    """Where true paths meet a plane: `point` (m, 3) is NaN unless `status` is HIT.
+
+    `transmission` (m, 3) is what absorption left of the light, Fresnel factors not included.
+    """
+
+    status: NDArray[np.int8]
+    point: Float
+    transmission: Float
+
+
+def follow(scene: ResolvedScene, rays: Rays, path: str) -> TruePaths:
+    """Rays from the camera along `path`. Raises ValueError where there is no closed form."""
+    bodies = [Body(solid) for solid in scene.solids]
+    m, count = len(rays.origins), len(path)
+    rows = np.arange(m)
+    o, d = rays.origins.copy(), rays.directions.copy()
+    status = np.full(m, Status.HIT, np.int8)
+    weight, absorbed = np.ones(m), np.zeros((m, 3))
+    cos_i = np.full((m, count), np.nan)
+    interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
+    ior = np.array([medium.ior for medium in scene.media])
+    sigma = np.array([medium.absorption for medium in scene.media])
+    chords = [body.chord(o, d) for body in bodies]
+    inside = np.array([(c.t_in < 0) & (c.t_out > 0) for c in chords]).reshape(len(bodies), m)
+    medium = np.full(m, scene.camera.medium, np.intp)
+
+    for k, letter in enumerate(path):
+        if k:
+            chords = [body.chord(o, d) for body in bodies]
+        t, n, which = _next_interface(chords, inside)
+        status[(status == Status.HIT) & ~np.isfinite(t)] = Status.MISS
+        live = status == Status.HIT
+        t = np.where(live, t, 0.0)
+        o = o + t[:, None] * d
+        absorbed += t[:, None] * sigma[medium]
+        facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
+        beyond = np.where(live, _beyond(bodies, which, inside[which, rows] if bodies else live), 0)
+        c = np.clip(-np.einsum("ij,ij->i", d, facing), 0, 1)
+        reflectance = fresnel(c, ior[medium], ior[beyond])
+        cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
+        if letter == "R":
+            weight *= np.where(live, reflectance, 1.0)
+            d = np.where(live[:, None], reflect(d, facing), d)
+            continue
+        bent, total = refract(d, facing, ior[medium], ior[beyond])
+        status[live & total] = Status.TIR
+        live &= ~total
+        weight *= np.where(live, 1 - reflectance, 1.0)
+        d = np.where(live[:, None], bent, d)
+        inside[which[live], np.flatnonzero(live)] ^= True
+        medium = np.where(live, beyond, medium)
+    return TruePaths(status, o, d, medium, weight, absorbed, cos_i, interface, normals, inside)
+
+
+def land(scene: ResolvedScene, paths: TruePaths, plane: Rectangle) -> Landing:
+    """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
+    frame = plane.frame
+    o, d = paths.origin, paths.direction
+    status = paths.status.copy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = ((np.array(frame.origin) - o) @ np.array(frame.z)) / (d @ np.array(frame.z))
+        point = o + t[:, None] * d
+        local = point - np.array(frame.origin)
+        x, y = local @ np.array(frame.x), local @ np.array(frame.y)
+        on = (t > 0) & (np.abs(x) <= plane.size[0] / 2) & (np.abs(y) <= plane.size[1] / 2)
+    status[(status == Status.HIT) & ~on] = Status.MISS
+    chords = [Body(solid).chord(o, d) for solid in scene.solids]
+    blocked, _, _ = _next_interface(chords, paths.inside)
+    status[(status == Status.HIT) & (blocked < t)] = Status.CUT
+    landed = status == Status.HIT
+    point[~landed] = np.nan
+    sigma = np.array([medium.absorption for medium in scene.media])
+    depth = paths.absorbed + np.where(landed, t, 0.0)[:, None] * sigma[paths.medium]
+    return Landing(status, point, np.exp(-depth))
+
+
+def _next_interface(
+    chords: list[Chord], inside: NDArray[np.bool_]
+) -> tuple[Float, Float, NDArray[np.intp]]:
+    """Distance, outward normal and solid of the next boundary; infinite where there is none.
+
+    Which root of a solid counts is known from whether the ray is inside it, so no distance has to
+    be thresholded and a slab of any thinness is seen.
+    """
+    m = inside.shape[1]
+    if not chords:
+        return np.full(m, np.inf), np.zeros((m, 3)), np.zeros(m, np.intp)
+    candidates = np.array(
+        [
+            np.where(within, c.t_out, np.where((c.t_in > 0) & (c.t_in < c.t_out), c.t_in, np.inf))
+            for c, within in zip(chords, inside, strict=True)
+        ]
+    )
+    nearest = candidates.argmin(0)
+    rows = np.arange(m)
+    n = np.array(
+        [np.where(w[:, None], c.n_out, c.n_in) for c, w in zip(chords, inside, strict=True)]
+    )
+    return candidates[nearest, rows], n[nearest, rows], nearest
+
+
+def _beyond(
+    bodies: list[Body], which: NDArray[np.intp], leaving: NDArray[np.bool_]
+) -> NDArray[np.intp]:
+    """The medium on the far side of each boundary."""
+    if not bodies:
+        return np.zeros(len(which), np.intp)
+    inner = np.array([body.solid.medium for body in bodies])
+    outer = np.array([body.solid.exterior for body in bodies])
+    return np.where(leaving, outer[which], inner[which])
