@@ -195,5 +195,5 @@ def _lines(diagnosis: Diagnosis) -> Iterator[tuple[bool, str, str, str]]:
 
 
 def _remedies(diagnosis: Diagnosis) -> list[tuple[str, str]]:
-    things = (*diagnosis.findings, *diagnosis.renderers)
+    things: list[Finding | Health] = [*diagnosis.findings, *diagnosis.renderers]
     return [(thing.name, thing.remedy) for thing in things if thing.remedy]
