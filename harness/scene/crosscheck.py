@@ -1,94 +1,117 @@
-"""What one part of a scene file says about another: names that must exist and be unique."""
+"""What one part of a scene file says about another: names that must exist and be unique.
+
+These checks read the document before it becomes a model, and pass over what the model will
+refuse, so that both kinds of mistakes are reported together.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache
 
 from harness.errors import nearest
 from harness.measure.observables import Observable
-from harness.scene import model
+from harness.scene.expressions import is_expression
 from harness.scene.findings import Finding, KeyPath, quoted
 
 AIR = "air"  # what surrounds everything; a scene may define it otherwise
 AGAINST = ("truth", "renderers")
-BUILT_IN = ("tracer", "povray", "mitsuba", "mitsuba-exact")
+BUILT_IN = frozenset({"tracer", "povray", "mitsuba", "mitsuba-exact"})
+
+Table = Mapping[str, object]
 
 
 @cache
 def registered_renderers() -> frozenset[str]:
-    """Names of the renderers of the entry-point group, which need not be importable."""
+    """Names of the renderers of the entry-point group; none of them is imported."""
     from importlib.metadata import entry_points
 
-    return frozenset(BUILT_IN) | {e.name for e in entry_points(group="snellcheck.renderers")}
+    return BUILT_IN | {entry.name for entry in entry_points(group="snellcheck.renderers")}
 
 
-def cross_findings(case: model.Case, renderers: Collection[str] = ()) -> list[Finding]:
-    """All broken references of a case; `renderers` are further names of renderers."""
+def cross_findings(document: Table, renderers: Collection[str] = ()) -> list[Finding]:
+    """All broken references of a document; `renderers` are further names of renderers."""
     return [
-        *_repeated(case),
-        *_media(case),
-        *_checks(case, registered_renderers() | set(renderers)),
+        *_repeated_names(document),
+        *_media(document),
+        *_checks(document, registered_renderers() | set(renderers)),
     ]
 
 
-def _unknown(path: KeyPath, what: str, name: str, known: Collection[str]) -> Finding:
+def _rows(table: Table, key: str) -> Iterator[tuple[int, Table]]:
+    rows = table.get(key)
+    for index, row in enumerate(rows if isinstance(rows, tuple) else ()):
+        if isinstance(row, dict):
+            yield index, row
+
+
+def _text(table: Table, key: str) -> str | None:
+    value = table.get(key)
+    return value if isinstance(value, str) and not is_expression(value) else None
+
+
+def _table(table: Table, key: str) -> Table:
+    value = table.get(key)
+    return value if isinstance(value, dict) else {}
+
+
+def _reference(path: KeyPath, name: str | None, known: Collection[str] | None) -> Iterator[Finding]:
+    """A finding where `name` is given and not known; the last key of `path` says what it is."""
+    if name is None or known is None or name in known:
+        return
+    key = next(part for part in reversed(path) if isinstance(part, str))
+    what = "renderer" if key == "against" else key.removesuffix("s")
     names = sorted(known)
-    expected = ", ".join(names) if names else f"a scene that defines a {what}"
-    return Finding(path, f"unknown {what}", quoted(name), expected, nearest(name, names))
+    expected = ", ".join(names) or f"a {what} that the scene defines"
+    yield Finding(path, f"unknown {what}", quoted(name), expected, nearest(name, names))
 
 
-def _repeated(case: model.Case) -> Iterator[Finding]:
-    groups: dict[str, Sequence[model.Solid | model.Surface | model.Probe]] = {
-        "solids": case.solids,
-        "surfaces": case.surfaces,
-        "probes": case.probes,
-    }
-    for group, members in groups.items():
+def _repeated_names(document: Table) -> Iterator[Finding]:
+    for group in ("solids", "surfaces", "probes"):
         seen: set[str] = set()
-        for index, member in enumerate(members):
-            if member.name in seen:
-                yield Finding((group, index, "name"), "name used twice", quoted(member.name))
-            seen.add(member.name)
+        for index, row in _rows(document, group):
+            name = _text(row, "name")
+            if name is not None and name in seen:
+                yield Finding((group, index, "name"), "name used twice", quoted(name))
+            seen.add(name or "")
 
 
-def _media(case: model.Case) -> Iterator[Finding]:
-    known = {AIR, *case.media}
-    uses: list[tuple[KeyPath, str | None]] = [
-        (("solids", index, "medium"), solid.medium) for index, solid in enumerate(case.solids)
-    ]
-    for index, surface in enumerate(case.surfaces):
-        if isinstance(surface.material, model.ThinSlab):
-            uses.append((("surfaces", index, "material", "medium"), surface.material.medium))
-    uses.append((("camera", "medium"), case.camera.medium))
-    for path, name in uses:
-        if name is not None and name not in known:
-            yield _unknown(path, "medium", name, known)
+def _media(document: Table) -> Iterator[Finding]:
+    known = {AIR, *_table(document, "media")}
+    for index, solid in _rows(document, "solids"):
+        yield from _reference(("solids", index, "medium"), _text(solid, "medium"), known)
+    for index, surface in _rows(document, "surfaces"):
+        material = _table(surface, "material")
+        path = ("surfaces", index, "material", "medium")
+        yield from _reference(path, _text(material, "medium"), known)
+    camera = _table(document, "camera")
+    yield from _reference(("camera", "medium"), _text(camera, "medium"), known)
 
 
-def _checks(case: model.Case, renderers: Collection[str]) -> Iterator[Finding]:
-    probes = [probe.name for probe in case.probes]
+def _checks(document: Table, renderers: Collection[str]) -> Iterator[Finding]:
+    names = [_text(row, "name") for _, row in _rows(document, "probes")]
+    # Where a probe's own name is missing, what refers to it is not to blame.
+    probes = None if None in names else {name for name in names if name}
     observables = [observable.value for observable in Observable]
-    for index, check in enumerate(case.checks):
+    for index, check in _rows(document, "checks"):
         path: KeyPath = ("checks", index)
-        if check.observable not in observables:
-            yield _unknown((*path, "observable"), "observable", check.observable, observables)
-        if check.against not in AGAINST and check.against not in renderers:
-            known = {*AGAINST, *renderers}
-            yield _unknown((*path, "against"), "opponent", check.against, known)
-        if check.probe is not None and check.probe not in probes:
-            yield _unknown((*path, "probe"), "probe", check.probe, probes)
-        for place, name in enumerate(check.renderers):
-            if name not in renderers:
-                yield _unknown((*path, "renderers", place), "renderer", name, renderers)
-        for place, known_deviation in enumerate(check.known):
-            if known_deviation.renderer not in renderers:
-                where = (*path, "known", place, "renderer")
-                yield _unknown(where, "renderer", known_deviation.renderer, renderers)
-            if known_deviation.at_least > known_deviation.at_most:
-                yield Finding(
-                    (*path, "known", place, "at_most"),
-                    "less than at_least",
-                    f"{known_deviation.at_most:g}",
-                    f"≥ {known_deviation.at_least:g}",
-                )
+        for key, known in (
+            ("observable", observables),
+            ("against", {*AGAINST, *renderers}),
+            ("probe", probes),
+        ):
+            yield from _reference((*path, key), _text(check, key), known)
+        names = check.get("renderers")
+        for place, name in enumerate(names if isinstance(names, tuple) else ()):
+            if isinstance(name, str):
+                yield from _reference((*path, "renderers", place), name, renderers)
+        for place, deviation in _rows(check, "known"):
+            yield from _known(deviation, (*path, "known", place), renderers)
+
+
+def _known(deviation: Table, path: KeyPath, renderers: Collection[str]) -> Iterator[Finding]:
+    yield from _reference((*path, "renderer"), _text(deviation, "renderer"), renderers)
+    least, most = deviation.get("at_least"), deviation.get("at_most")
+    if isinstance(least, int | float) and isinstance(most, int | float) and least > most:
+        where = (*path, "at_most")
+        yield Finding(where, "less than at_least", quoted(most), f"≥ {quoted(least)}")

@@ -11,6 +11,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from harness.errors import nearest
+from harness.scene.document import value_at
 from harness.scene.findings import Finding, KeyPath, quoted
 from harness.scene.model import Case
 
@@ -42,8 +43,14 @@ BOUNDS = {
 
 def findings_of(error: ValidationError, document: dict[str, object]) -> list[Finding]:
     """One finding per error of `Case`, without repetitions."""
-    details = error.errors(include_url=False)
+    details = [d for d in error.errors(include_url=False) if not _is_consequence(d)]
     return list(dict.fromkeys(_finding(detail, document) for detail in details))
+
+
+def _is_consequence(detail: ErrorDetails) -> bool:
+    """Whether an array is called too short only because elements in it are wrong."""
+    least = detail.get("ctx", {}).get("min_length")
+    return detail["type"] == "too_short" and least is not None and len(detail["input"]) >= least
 
 
 def _finding(detail: ErrorDetails, document: dict[str, object]) -> Finding:
@@ -70,7 +77,7 @@ def _finding(detail: ErrorDetails, document: dict[str, object]) -> Finding:
     if kind in WRONG_TYPE:
         return Finding(path, "wrong type", value, expectation(schema) or WRONG_TYPE[kind])
     if kind == "string_pattern_mismatch":
-        return Finding(path, "not a valid text", value, f"a match of {context['pattern']}")
+        return Finding(path, "not a valid text", value, expectation(schema))
     if kind in ("string_too_short", "string_too_long"):
         bound = context.get("min_length", context.get("max_length"))
         side = "at least" if "min_length" in context else "at most"
@@ -151,20 +158,9 @@ def _located(loc: tuple[str | int, ...], document: dict[str, object]) -> tuple[K
         schema = _child(schema, part)
         if part not in tags:
             path.append(part)
-    absent = bool(path) and not _present(tuple(path), document)
+    absent = value_at(document, tuple(path)) is None
     unknown = bool(path) and isinstance(path[-1], str) and not schema
     return tuple(path), around if absent or unknown else schema
-
-
-def _present(path: KeyPath, document: object) -> bool:
-    for part in path:
-        if isinstance(part, int) and isinstance(document, tuple) and part < len(document):
-            document = document[part]
-        elif isinstance(part, str) and isinstance(document, dict) and part in document:
-            document = document[part]
-        else:
-            return False
-    return True
 
 
 # --- what was expected ----------------------------------------------------------------------------
@@ -183,7 +179,7 @@ def expectation(schema: Schema) -> str | None:
             noun = "an integer" if kind == "integer" else "a number"
             return f"{noun} {' and '.join(bounds)}" if bounds else noun
         case "string":
-            return f"a match of {schema['pattern']}" if "pattern" in schema else "a text"
+            return str(schema.get("description", "a text"))
         case "boolean":
             return "true or false"
         case "array":

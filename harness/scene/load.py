@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -13,16 +12,18 @@ from pydantic import ValidationError
 
 from harness.errors import InputError, Problem, nearest
 from harness.scene.crosscheck import cross_findings
-from harness.scene.expand import Permutation, Value, expand, is_expression
+from harness.scene.document import parse_document, read_source, value_at
+from harness.scene.expand import Permutation, expand
 from harness.scene.explain import findings_of
-from harness.scene.findings import Finding, KeyPath, problems
+from harness.scene.expressions import Value, is_expression
+from harness.scene.findings import Finding, problems, quoted
 from harness.scene.model import Case, Film
 
 Quality = Literal["draft", "normal", "high"]
 QUALITIES: tuple[str, ...] = get_args(Quality)
 SCALE = {"draft": 0.5, "normal": 1.0, "high": 2.0}  # of the film's width and height
 
-LARGEST_FILE = 8 * 2**20  # bytes; a scene with a written-out mesh has some 100 per triangle
+MOST_PROBLEMS = 100  # of one file; more would help nobody
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class LoadedCase:
     """One permutation of a scene file.
 
     `id` is unique in a suite, such as ``slab-offset[thickness=0.25,ior=1.5]``; `case` is its part
-    without the axes. `parameters` has the values of axes and parameters.
+    without the axes. `parameters` has the values of axes, then of parameters.
     """
 
     id: str
@@ -48,102 +49,211 @@ def load_cases(
     `renderers` are names that checks may use beside those of the registered renderers. Raises
     InputError with every problem of the file.
     """
-    if quality not in QUALITIES:
-        raise InputError.of(
-            f"unknown quality {quality!r}",
-            expected=", ".join(QUALITIES),
-            suggestion=nearest(quality, QUALITIES),
-        )
-    source = _read(path)
-    expansion = expand(_parse(source, path))
-    findings = dict.fromkeys(expansion.findings)
-    seen = {finding.path for finding in findings}
-    models: list[tuple[Permutation, Case]] = []
+    scale = scale_of(quality)
+    source = read_source(path)
+    document = parse_document(source, path)
+    expansion = expand(document)
+    findings = list(expansion.findings)
+    reported = {finding.path for finding in findings}
+    models: list[Case] = []
     for permutation in expansion.permutations:
-        model, found = _validate(permutation, renderers)
-        # A later permutation's problem with the same key would repeat the first one's.
-        findings.update(dict.fromkeys(f for f in found if f.path not in seen))
+        model, found = _validate(permutation, document, renderers)
         if model is not None:
-            models.append((permutation, _scaled(model, SCALE[quality])))
-        seen.update(f.path for f in found)
+            models.append(_scaled(model, scale))
+        # What is wrong with a key was said already where an earlier permutation showed it.
+        new = [finding for finding in found if finding.path not in reported]
+        findings += new
+        reported |= {finding.path for finding in new}
     if findings:
-        raise InputError(problems(findings, path, source))
+        raise InputError(problems(findings, path, source)[:MOST_PROBLEMS])
     case = case_name(path)
     return [
         LoadedCase(case + p.suffix, case, path, {**p.axes, **p.parameters}, model)
-        for p, model in models
+        for p, model in zip(expansion.permutations, models, strict=True)
     ]
+
+
+def scale_of(quality: str) -> float:
+    """By how much a quality scales films. Raises InputError for an unknown one."""
+    if quality not in QUALITIES:
+        raise InputError.of(
+            "unknown quality",
+            value=quoted(quality),
+            expected=", ".join(QUALITIES),
+            suggestion=nearest(quality, QUALITIES),
+        )
+    return SCALE[quality]
 
 
 def case_name(path: Path) -> str:
     """``scenes/slab/offset.toml`` is the case ``slab-offset``."""
-    parts = (path.resolve().parent.name, path.stem)
+    parts = (path.absolute().parent.name, path.stem)
     words = (re.sub(r"[^A-Za-z0-9_]+", "-", part).strip("-") for part in parts)
     return "-".join(word for word in words if word) or "case"
 
 
-def _read(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            source = file.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError.of(f"cannot be read: {reason}", file=path) from error
-    if len(source) > LARGEST_FILE:
-        raise InputError.of(f"file of more than {LARGEST_FILE} bytes", file=path)
-    return source
-
-
-def _parse(source: bytes, path: Path) -> dict[str, object]:
-    try:
-        return tomllib.loads(source.decode("utf-8"))
-    except UnicodeDecodeError as error:
-        line = source.count(b"\n", 0, error.start) + 1
-        raise InputError.of("not UTF-8 text", file=path, line=line) from error
-    except RecursionError as error:
-        raise InputError.of("nested too deeply", file=path) from error
-    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
-        message, line = str(error), None
-        if position := re.search(r" \(at line (\d+), column (\d+)\)$", message):
-            line = int(position[1])
-            message = f"{message[: position.start()]} in column {position[2]}"
-        elif message.endswith(" (at end of document)"):
-            line = source.count(b"\n") + 1
-        raise InputError.of(f"not valid TOML: {message}", file=path, line=line) from error
-
-
 def _validate(
-    permutation: Permutation, renderers: Collection[str]
+    permutation: Permutation, document: dict[str, object], renderers: Collection[str]
 ) -> tuple[Case | None, list[Finding]]:
+    """The model of one permutation, None where it is not valid, and all that is wrong."""
+    data = permutation.data
+    model, found = None, []
     try:
-        model = Case.model_validate(permutation.data)
+        model = Case.model_validate(data)
     except ValidationError as error:
-        found = findings_of(error, permutation.data)
-        found = [f for f in found if not is_expression(_at(permutation.data, f.path))]
-        return None, [_with_origin(f, permutation) for f in found]
-    return model, cross_findings(model, renderers)
+        found = findings_of(error, data)
+    found += cross_findings(data, renderers)
+    # An expression without a value is still in its place, and has been reported.
+    return model, [
+        _shown_with_origin(finding, permutation, document)
+        for finding in found
+        if not is_expression(value_at(data, finding.path))
+    ]
 
 
-def _with_origin(finding: Finding, permutation: Permutation) -> Finding:
-    return finding
-
-
-def _at(document: object, path: KeyPath) -> object:
-    """The value at a path; None where there is none."""
-    for part in path:
-        try:
-            document = document[part]  # type: ignore[index]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return document
+def _shown_with_origin(
+    finding: Finding, permutation: Permutation, document: dict[str, object]
+) -> Finding:
+    """Where a wrong value came from an expression, the message shows both."""
+    written = value_at(document, finding.path)
+    if finding.value is None or not is_expression(written):
+        return finding
+    return replace(finding, value=f"{quoted(written)} = {finding.value}{permutation.where}")
 
 
 def _scaled(model: Case, scale: float) -> Case:
     film = model.film
     if not film.scalable or scale == 1.0:
         return model
-    film = Film(
-        width=max(1, round(film.width * scale)),
-        height=max(1, round(film.height * scale)),
+    scaled = Film(
+        width=max(1, round(film.width * scale)), height=max(1, round(film.height * scale))
     )
-    return model.model_copy(update={"film": film})
+    return model.model_copy(update={"film": scaled})
+
+
+# --- selection ------------------------------------------------------------------------------------
+
+
+@dataclass
+class _Suite:
+    """The cases below a folder, and what is wrong with the files that could not be loaded."""
+
+    cases: list[LoadedCase] = field(default_factory=list)
+    broken: dict[Path, InputError] = field(default_factory=dict)
+
+
+def scene_files(folder: Path) -> list[Path]:
+    """All scene files below a folder, in an order that does not depend on the machine."""
+    return sorted(path for path in folder.rglob("*.toml") if path.is_file())
+
+
+def find(
+    selections: Sequence[str],
+    root: Path,
+    quality: str = "normal",
+    renderers: Collection[str] = (),
+) -> list[LoadedCase]:
+    """The cases that `selections` name, without repetitions, in the order of ids per file.
+
+    A selection is a scene file, a folder of them, a family, or a case's id in which ``*`` and
+    ``?`` stand for any characters; a case's name without axes means all of its permutations.
+    Files and folders are found from the working folder, everything else below `root`. Without
+    selections, all cases below `root`.
+
+    Raises InputError for a selection that matches nothing and for each selected file with
+    problems; what is wrong in files that are not selected does not matter.
+    """
+    scale_of(quality)
+    files = [Path(selection) for selection in selections if _is_path(selection)]
+    globs = [selection for selection in selections if not _is_path(selection)]
+    found: dict[str, LoadedCase] = {}
+    problems: list[Problem] = []
+    for path in files:
+        suite = _load(scene_files(path) if path.is_dir() else [path], quality, renderers)
+        _add(suite.cases, found, problems)
+        for error in suite.broken.values():
+            problems += error.problems
+        if not suite.cases and not suite.broken:
+            problems.append(Problem("holds no scene files (*.toml)", file=path))
+    if globs or not selections:
+        _select(globs, _load(scene_files(root), quality, renderers), root, found, problems)
+    if problems:
+        raise InputError(list(dict.fromkeys(problems)))
+    return list(found.values())
+
+
+def _is_path(selection: str) -> bool:
+    """Paths are told by how they look: "slab" is a family, even beside a folder of that name."""
+    return selection in (".", "..") or selection.endswith(".toml") or "/" in selection
+
+
+def _load(files: Sequence[Path], quality: str, renderers: Collection[str]) -> _Suite:
+    suite = _Suite()
+    for path in files:
+        try:
+            suite.cases += load_cases(path, quality, renderers)
+        except InputError as error:
+            suite.broken[path] = error
+    return suite
+
+
+def _add(
+    cases: Sequence[LoadedCase], found: dict[str, LoadedCase], problems: list[Problem]
+) -> None:
+    for case in cases:
+        other = found.setdefault(case.id, case)
+        if other.file.absolute() != case.file.absolute():
+            problems.append(
+                Problem(f"its case {case.case} is also in {other.file}", file=case.file)
+            )
+
+
+def _select(
+    globs: Sequence[str],
+    suite: _Suite,
+    root: Path,
+    found: dict[str, LoadedCase],
+    problems: list[Problem],
+) -> None:
+    if not suite.cases and not suite.broken:
+        problems.append(Problem("holds no scene files (*.toml)", file=root))
+    for glob in globs or ["*"]:
+        pattern = _pattern(glob)
+        chosen = [case for case in suite.cases if _matches(pattern, case)]
+        broken = [path for path in suite.broken if _may_match(pattern, glob, path)]
+        _add(chosen, found, problems)
+        for path in broken:
+            problems += suite.broken[path].problems
+        if not chosen and not broken and globs:
+            problems.append(_no_match(glob, suite))
+            for error in suite.broken.values():  # where what was meant may be
+                problems += error.problems
+
+
+def _pattern(glob: str) -> re.Pattern[str]:
+    # Brackets are not wildcards: they belong to ids.
+    text = re.escape(glob).replace(r"\*", ".*").replace(r"\?", ".")
+    return re.compile(text, re.DOTALL)
+
+
+def _matches(pattern: re.Pattern[str], case: LoadedCase) -> bool:
+    return any(pattern.fullmatch(name) for name in (case.id, case.case, case.model.family))
+
+
+def _may_match(pattern: re.Pattern[str], glob: str, path: Path) -> bool:
+    """Whether a file that could not be loaded might have the case that is asked for."""
+    name = case_name(path)
+    names = (name, path.absolute().parent.name)
+    return any(map(pattern.fullmatch, names)) or glob.startswith(f"{name}[")
+
+
+def _no_match(glob: str, suite: _Suite) -> Problem:
+    broken = {case_name(path) for path in suite.broken}
+    names = {c.case for c in suite.cases} | {c.model.family for c in suite.cases} | broken
+    close = nearest(glob, {c.id for c in suite.cases}) if "[" in glob else None
+    wildcards = glob.replace("*", "").replace("?", "").rstrip("-")
+    return Problem(
+        f"no case matches {glob!r}",
+        expected="a case, a family or a scene file; `snellcheck list` shows them",
+        suggestion=close or nearest(glob, names) or nearest(wildcards, names),
+    )

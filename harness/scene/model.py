@@ -21,7 +21,14 @@ Rgb = tuple[
     Annotated[float, Field(ge=0, allow_inf_nan=False)],
 ]
 Reflectance = tuple[Unit, Unit, Unit]
-Name = Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
+Name = Annotated[
+    str,
+    Field(
+        max_length=64,
+        pattern=r"^[A-Za-z][A-Za-z0-9_-]*$",
+        description="a name: a letter, then letters, digits, _ and -",
+    ),
+]
 
 
 class Strict(BaseModel):
@@ -288,7 +295,9 @@ class Probe(Strict):
     """
 
     name: Name
-    path: Annotated[str, Field(pattern=r"^[TR]*$", max_length=64)]
+    path: Annotated[
+        str, Field(pattern=r"^[TR]*$", max_length=64, description="letters T and R, as in TRT")
+    ]
     planes: Annotated[tuple[Rectangle, ...], Field(min_length=1, max_length=2)]
     cells: Annotated[int, Field(ge=1, le=16384)] = 1000
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from typing import Literal, TypeVar
 
-import numpy as np
-
 from harness.scene import model, resolved
-from harness.scene.containment import signed_distance
 from harness.scene.crosscheck import AIR
 from harness.scene.findings import Finding, KeyPath, SceneInvalid, input_error, quoted
 from harness.scene.load import LoadedCase
 from harness.scene.resolved import ResolvedScene
-from harness.scene.shapes import rectangle, slab, solid_shape, surface_shape
+from harness.scene.shapes import rectangle, solid_shape, surface_shape
 from harness.scene.vectors import PARALLEL, cross, length, unit
 
 Result = TypeVar("Result")
@@ -121,7 +117,12 @@ def _camera(camera: model.Camera) -> resolved.Camera:
             )
         )
     right = unit(across)
-    base = {"origin": camera.origin, "right": right, "up": unit(cross(right, forward)), "forward": forward}
+    base = {
+        "origin": camera.origin,
+        "right": right,
+        "up": unit(cross(right, forward)),
+        "forward": forward,
+    }
     if isinstance(camera, model.PerspectiveCamera):
         k = math.tan(math.radians(camera.fov_x / 2))
         return resolved.Perspective(**base, tan_half_fov_x=k)
@@ -175,7 +176,9 @@ def with_code_plane(
     plane = resolved.Surface(
         name="code-plane", shape=probe_plane, material=resolved.Emissive(pattern=code)
     )
-    kept = (s for s in scene.surfaces if isinstance(s.material, resolved.ThinSlab | resolved.Mirror))
+    kept = (
+        s for s in scene.surfaces if isinstance(s.material, resolved.ThinSlab | resolved.Mirror)
+    )
     transport = resolved.Transport(
         max_depth=len(path) + 1,
         min_weight=scene.transport.min_weight,

@@ -158,9 +158,7 @@ class Picture(Frozen):
     pixels: str
 
 
-Pattern = Annotated[
-    Constant | Checker | Ramp | PositionCode | Picture, Field(discriminator="type")
-]
+Pattern = Annotated[Constant | Checker | Ramp | PositionCode | Picture, Field(discriminator="type")]
 
 
 # --- materials of surfaces that bound no medium ---------------------------------------------------

@@ -146,9 +146,7 @@ def _convex(shape: model.Box | model.Slab | model.Prism) -> resolved.Convex:
             return _prism(shape)
 
 
-def slab(
-    front: resolved.Frame, size: tuple[float, float], thickness: float
-) -> resolved.Convex:
+def slab(front: resolved.Frame, size: tuple[float, float], thickness: float) -> resolved.Convex:
     """The box of `thickness` behind the face that `front` is the frame of."""
     return _box(front, tuple(extent / 2 for extent in size), (-thickness, 0.0))
 
@@ -191,9 +189,7 @@ def _opposite(a: Vec3) -> Vec3:
     return 0.0 - a[0], 0.0 - a[1], 0.0 - a[2]
 
 
-def _polyhedron(
-    vertices: Sequence[Vec3], faces: Faces, normals: Sequence[Vec3]
-) -> resolved.Convex:
+def _polyhedron(vertices: Sequence[Vec3], faces: Faces, normals: Sequence[Vec3]) -> resolved.Convex:
     """Planes through the rounded vertices: each lies midway between those of its face."""
     planes = []
     for face, normal in zip(faces, normals, strict=True):

@@ -38,7 +38,7 @@ def cross(a: Vec3, b: Vec3) -> Vec3:
 
 
 def combination(origin: Vec3, scales: Sequence[float], axes: Sequence[Vec3]) -> Vec3:
-    """origin + sum of scale * axis, each component rounded once."""
+    """Origin + sum of scale * axis, each component rounded once."""
     x, y, z = (
         dot((1.0, *scales), (origin[i], *(axis[i] for axis in axes))) + 0.0 for i in range(3)
     )
@@ -59,7 +59,7 @@ def unit(a: Vec3) -> Vec3 | None:
 
 
 def frame(origin: Vec3, normal: Vec3, up: Vec3) -> Frame | None:
-    """z along `normal`, y as near to `up` as it can be; None where they are parallel or zero."""
+    """Z along `normal`, y as near to `up` as it can be; None where they are parallel or zero."""
     z, towards = unit(normal), unit(up)
     if z is None or towards is None:
         return None

@@ -1,0 +1,54 @@
+"""Scene files as TOML documents, before anything in them has a meaning."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from harness.errors import InputError
+from harness.scene.findings import KeyPath
+
+LARGEST_FILE = 8 * 2**20  # bytes; a mesh written out has some 100 per triangle
+
+
+def read_source(path: Path) -> bytes:
+    """The bytes of a scene file. Raises InputError where it is unreadable or too large."""
+    try:
+        with path.open("rb") as file:
+            source = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError.of(f"cannot be read: {reason}", file=path) from error
+    if len(source) > LARGEST_FILE:
+        raise InputError.of(f"larger than {LARGEST_FILE} bytes", file=path)
+    return source
+
+
+def parse_document(source: bytes, path: Path) -> dict[str, object]:
+    """The TOML data of `source`; raises InputError with the line of what is not valid TOML."""
+    try:
+        return tomllib.loads(source.decode("utf-8"))
+    except UnicodeDecodeError as error:
+        line = source.count(b"\n", 0, error.start) + 1
+        raise InputError.of("not UTF-8 text", file=path, line=line) from error
+    except RecursionError as error:
+        raise InputError.of("nested too deeply", file=path) from error
+    except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
+        message, line = str(error), None
+        if position := re.search(r" \(at line (\d+), column (\d+)\)$", message):
+            line = int(position[1])
+            message = f"{message[: position.start()]} in column {position[2]}"
+        elif message.endswith(" (at end of document)"):
+            line = source.count(b"\n") + 1
+        raise InputError.of(f"not valid TOML: {message}", file=path, line=line) from error
+
+
+def value_at(document: object, path: KeyPath) -> object:
+    """The value at a path of a document; None where there is none."""
+    for part in path:
+        try:
+            document = document[part]  # type: ignore[index]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return document
