@@ -161,6 +161,11 @@ def test_a_libllvm_serves_from_17_on(machine: Machine, line: str, serves: bool) 
     assert ("libllvm19" not in machine.setup()) is serves
 
 
+def test_a_libllvm_that_aborts_is_not_installed_where_there_is_no_better(machine: Machine) -> None:
+    machine.has("apt-cache", "echo 'libllvm16 - aborts'")
+    assert "libllvm16" not in machine.setup()
+
+
 def test_a_second_run_does_and_says_nothing(machine: Machine) -> None:
     machine.has_everything()
     assert "ready" in machine.setup()
