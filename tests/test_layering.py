@@ -31,6 +31,8 @@ LAYERS = (
     ("probe",),
     ("measure",),
     ("verdict", "preflight"),
+    ("plan",),
+    ("judge",),
     ("report",),
     ("run", "doctor"),
     ("cli",),
@@ -38,7 +40,15 @@ LAYERS = (
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 
 # The only places of the harness that know our own tracer: it is judged like any other renderer.
-TRACER_ADAPTERS = {"harness/renderers/tracer.py", "harness/translate/tracer.py"}
+TRACER_ADAPTERS = {"harness.renderers.tracer", "harness.translate.tracer"}
+
+# Modules that work inside a renderer's own process and may load what that needs. To everybody else
+# they are as heavy as what they load.
+WORKER_ONLY = TRACER_ADAPTERS | {
+    "harness.renderers.mitsuba_image",
+    "harness.renderers.mitsuba_lobes",
+    "harness.renderers.mitsuba_rays",
+}
 
 # What makes `snellcheck --help` slow, or can abort the process, is imported where it is used.
 HEAVY = {
@@ -158,14 +168,20 @@ def test_truth_knows_neither_the_tracer_nor_any_renderer(file: str) -> None:
 
 
 def test_only_its_adapters_know_the_tracer() -> None:
-    knowing = {f for f in sources("harness") for i in imports_of(f) if i.package == "tracer"}
-    assert knowing <= TRACER_ADAPTERS
+    for file in (f for f in sources("harness") if module_name(f) not in TRACER_ADAPTERS):
+        assert not [str(i) for i in imports_of(file) if i.package == "tracer"]
+
+
+def is_heavy(found: Import) -> bool:
+    return found.package in HEAVY or any(
+        f"{found.name}.".startswith(f"{module}.") for module in WORKER_ONLY
+    )
 
 
 @pytest.mark.parametrize("file", sources("harness"))
 def test_heavy_modules_are_imported_where_they_are_used(file: str) -> None:
-    heavy = HEAVY - ({"tracer"} if file in TRACER_ADAPTERS else set())
-    assert not [str(i) for i in imports_of(file) if i.at_load and i.package in heavy]
+    if module_name(file) not in WORKER_ONLY:
+        assert not [str(i) for i in imports_of(file) if i.at_load and is_heavy(i)]
 
 
 @pytest.mark.parametrize("file", sources("harness"))
@@ -214,6 +230,21 @@ def test_modules_are_short_and_say_what_they_are_for(file: str) -> None:
 )
 def test_imports_are_found_wherever_they_stand(source: str, name: str, at_load: bool) -> None:
     assert [(i.name, i.at_load) for i in imports_in(source)] == [(name, at_load)]
+
+
+@pytest.mark.parametrize(
+    ("source", "heavy"),
+    [
+        ("import scipy.special", True),
+        ("from harness.renderers import mitsuba_rays", True),
+        ("from harness.renderers.mitsuba_rays import follow", True),
+        ("from harness.renderers import mitsuba", False),
+        ("import json", False),
+    ],
+)
+def test_a_module_is_as_heavy_as_what_it_loads(source: str, heavy: bool) -> None:
+    (found,) = imports_in(source)
+    assert is_heavy(found) is heavy
 
 
 @pytest.mark.parametrize(
