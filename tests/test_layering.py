@@ -10,8 +10,9 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -31,10 +32,8 @@ LAYERS = (
     ("probe",),
     ("measure",),
     ("verdict", "preflight"),
-    ("plan",),
-    ("judge",),
-    ("report",),
-    ("run", "doctor"),
+    ("plan", "results", "pairs", "judge", "run"),
+    ("report", "doctor"),
     ("cli",),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
@@ -152,6 +151,24 @@ def test_imports_follow_the_flow(file: str) -> None:
     assert stage in LAYER, f"say in LAYERS where {stage} belongs"
     upstream = {s for s, depth in LAYER.items() if depth <= LAYER[stage]}
     assert not [str(i) for i in imports_of(file) if i.stage not in {None, *upstream}]
+
+
+@pytest.mark.parametrize("package", ["harness", "tracer"])
+def test_modules_do_not_import_each_other_in_circles(package: str) -> None:
+    """Not even inside functions: a circle means that two modules are one."""
+    modules = {module_name(file): file for file in sources(package)}
+    graph = {
+        module: {known for i in imports_of(file) if (known := longest_known(i.name, modules))}
+        for module, file in modules.items()
+    }
+    tuple(TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle
+
+
+def longest_known(name: str, modules: Container[str]) -> str | None:
+    """The module that a dotted name reaches: "harness.run.suite" reaches "harness.run"."""
+    while "." in name and name not in modules:
+        name = name.rpartition(".")[0]
+    return name if "." in name else None
 
 
 @pytest.mark.parametrize("file", sources("harness/report"))
