@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+import enum
+import itertools
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.scene import resolved
+from harness.scene.tessellation import distance, winding
 
 Points = NDArray[np.float64]  # (n, 3)
+
+MOST_WORK = 2_000_000  # points x triangles that one comparison of solids may take
+
+
+class Relation(enum.Enum):
+    """Of solid a to solid b. Solids that only touch are APART."""
+
+    APART = enum.auto()
+    INSIDE = enum.auto()
+    AROUND = enum.auto()
+    OVERLAP = enum.auto()
 
 
 def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.float64]:
@@ -17,16 +33,242 @@ def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.fl
     """
     match shape:
         case resolved.Sphere():
-            return np.linalg.norm(points - np.array(shape.center), axis=1) - shape.radius
+            away = np.linalg.norm(points - np.array(shape.center), axis=1)
+            return np.asarray(away - shape.radius)
         case resolved.Convex():
             planes = np.array(shape.planes)
-            return np.max(points @ planes[:, :3].T - planes[:, 3], axis=1)
+            return np.asarray(np.max(points @ planes[:, :3].T - planes[:, 3], axis=1))
         case resolved.Cylinder():
+            axis = np.array(shape.frame.z)
             local = points - np.array(shape.frame.origin)
-            along = local @ np.array(shape.frame.z)
-            across = np.linalg.norm(local - along[:, None] * np.array(shape.frame.z), axis=1)
-            return np.maximum(across - shape.radius, np.abs(along) - shape.height / 2)
+            along = local @ axis
+            across = np.linalg.norm(local - along[:, None] * axis, axis=1)
+            return np.asarray(np.maximum(across - shape.radius, np.abs(along) - shape.height / 2))
         case resolved.Mesh():
-            from harness.scene.mesh import signed_distance as mesh_distance
+            vertices, triangles = np.array(shape.vertices), np.array(shape.triangles)
+            inside = winding(points, vertices, triangles) > 0.5
+            return distance(points, vertices, triangles) * np.where(inside, -1.0, 1.0)
 
-            return mesh_distance(shape, points)
+
+def bounds(shape: resolved.SurfaceShape) -> tuple[Points, Points]:
+    """Smallest and largest coordinates of a shape, each (3,)."""
+    match shape:
+        case resolved.Sphere():
+            center = np.array(shape.center)
+            return center - shape.radius, center + shape.radius
+        case resolved.Convex() | resolved.Mesh():
+            vertices = np.array(shape.vertices)
+            return vertices.min(axis=0), vertices.max(axis=0)
+        case resolved.Rectangle():
+            axes = np.array([shape.frame.x, shape.frame.y])
+            reach = np.abs(axes.T) @ (np.array(shape.size) / 2)
+        case resolved.Disk():
+            reach = shape.radius * _across(shape.frame)
+        case resolved.Cylinder():
+            reach = shape.radius * _across(shape.frame)
+            reach = reach + shape.height / 2 * np.abs(np.array(shape.frame.z))
+    origin = np.array(shape.frame.origin)
+    return origin - reach, origin + reach
+
+
+def _across(frame: resolved.Frame) -> Points:
+    """How far a unit disk in the frame's x-y plane reaches along each world axis."""
+    return np.asarray(np.hypot(np.array(frame.x), np.array(frame.y)))
+
+
+def relation(a: resolved.SolidShape, b: resolved.SolidShape, tolerance: float) -> Relation:
+    """How two solids lie to each other, by points of their surfaces and by crossing edges.
+
+    Exact between spheres, and between spheres and polyhedra; in other pairs a shallow overlap
+    between the sample points may go unseen. What is nearer than `tolerance` touches.
+    """
+    (a_low, a_high), (b_low, b_high) = bounds(a), bounds(b)
+    if np.any(a_low > b_high) or np.any(b_low > a_high):
+        return Relation.APART
+    a_middle, b_middle = (a_low + a_high) / 2, (b_low + b_high) / 2
+    of_a = signed_distance(b, _samples(a, b_middle, b))
+    of_b = signed_distance(a, _samples(b, a_middle, a))
+    a_in, a_out = (of_a < -tolerance).any(), (of_a > tolerance).any()
+    b_in, b_out = (of_b < -tolerance).any(), (of_b > tolerance).any()
+    if (a_in and a_out) or (b_in and b_out) or (a_in and b_in):
+        return Relation.OVERLAP
+    if not (a_in or a_out or b_in or b_out):
+        return Relation.OVERLAP  # the same solid twice
+    if _crossing(a, b, tolerance) or _crossing(b, a, tolerance):
+        return Relation.OVERLAP
+    if a_in:
+        return Relation.INSIDE
+    return Relation.AROUND if b_in else Relation.APART
+
+
+def containers(shapes: Sequence[resolved.SolidShape], tolerance: float) -> list[int | None]:
+    """For each solid the smallest other one that contains it, None where none does.
+
+    Raises ValueError(i, j) for the first two solids that overlap partly.
+    """
+    around: list[set[int]] = [set() for _ in shapes]
+    for i, j in itertools.combinations(range(len(shapes)), 2):
+        match relation(shapes[i], shapes[j], tolerance):
+            case Relation.OVERLAP:
+                raise ValueError(i, j)
+            case Relation.INSIDE:
+                around[i].add(j)
+            case Relation.AROUND:
+                around[j].add(i)
+    # Of several containers the smallest is the one that lies inside most others.
+    return [max(outer, key=lambda k: len(around[k]), default=None) for outer in around]
+
+
+def innermost(
+    shapes: Sequence[resolved.SolidShape],
+    containers: Sequence[int | None],
+    point: Sequence[float],
+    tolerance: float,
+) -> int | None:
+    """The smallest solid around a point, None outside all; `containers` as of `containers`.
+
+    Raises ValueError(k) where the point lies on the surface of solid k.
+    """
+    found: set[int] = set()
+    for k, shape in enumerate(shapes):
+        low, high = bounds(shape)
+        if np.any(low - tolerance > point) or np.any(high + tolerance < point):
+            continue
+        away = signed_distance(shape, np.array([point], dtype=np.float64))[0]
+        if abs(away) <= tolerance:
+            raise ValueError(k)
+        if away < 0:
+            found.add(k)
+    return next(iter(found - {containers[k] for k in found}), None)
+
+
+# --- sample points --------------------------------------------------------------------------------
+
+
+def _samples(shape: resolved.SolidShape, towards: Points, other: resolved.SolidShape) -> Points:
+    """Points on the surface of `shape`, few enough to be compared with `other`."""
+    match shape:
+        case resolved.Sphere():
+            center = np.array(shape.center)
+            line = towards - center
+            size = np.linalg.norm(line)
+            # The points nearest to and farthest from another sphere decide alone.
+            ends = [line / size, -line / size] if size > 0 else []
+            points = center + shape.radius * np.array([*ends, *_sphere_directions()])
+        case resolved.Convex():
+            points = _polyhedron_samples(shape)
+        case resolved.Cylinder():
+            points = _cylinder_samples(shape)
+        case resolved.Mesh():
+            vertices = np.array(shape.vertices)
+            points = np.concatenate([vertices, vertices[np.array(shape.triangles)].mean(axis=1)])
+    most = MOST_WORK // len(other.triangles) if isinstance(other, resolved.Mesh) else 10_000
+    return points[:: max(1, -(-len(points) // max(most, 8)))]
+
+
+def _sphere_directions() -> Points:
+    """The six axes and 64 evenly spread directions (a Fibonacci lattice)."""
+    k = np.arange(64) + 0.5
+    z, turn = 1 - k / 32, np.pi * (1 + 5**0.5) * k
+    across = np.sqrt(1 - z * z)
+    spread = np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
+    return np.concatenate([np.eye(3), -np.eye(3), spread])
+
+
+def _polyhedron_samples(shape: resolved.Convex) -> Points:
+    vertices = np.array(shape.vertices)
+    along = np.linspace(0, 1, 9)[:, None]
+    edges = [
+        vertices[i] + along * (vertices[j] - vertices[i])
+        for face in shape.faces
+        for i, j in zip(face, (*face[1:], face[0]), strict=True)
+        if i < j
+    ]
+    middles = [vertices[list(face)].mean(axis=0, keepdims=True) for face in shape.faces]
+    return np.concatenate([vertices, *edges, *middles])
+
+
+def _cylinder_samples(shape: resolved.Cylinder) -> Points:
+    turn = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    across = np.outer(np.cos(turn), shape.frame.x) + np.outer(np.sin(turn), shape.frame.y)
+    axis = np.array(shape.frame.z) * shape.height / 2
+    rings = [shape.radius * across + level * axis for level in np.linspace(-1, 1, 9)]
+    return np.concatenate([*rings, [axis, -axis]]) + np.array(shape.frame.origin)
+
+
+# --- crossings of surfaces ------------------------------------------------------------------------
+
+
+def _triangles(shape: resolved.SolidShape) -> tuple[Points, NDArray[np.int64]] | None:
+    """A polyhedron's vertices and triangles; None for round shapes."""
+    if isinstance(shape, resolved.Mesh):
+        return np.array(shape.vertices), np.array(shape.triangles, dtype=np.int64)
+    if isinstance(shape, resolved.Convex):
+        fans = [(f[0], f[k], f[k + 1]) for f in shape.faces for k in range(1, len(f) - 1)]
+        return np.array(shape.vertices), np.array(fans, dtype=np.int64)
+    return None
+
+
+def _crossing(a: resolved.SolidShape, b: resolved.SolidShape, tolerance: float) -> bool:
+    """Whether polyhedron b passes through the surface of a sphere, or its surface cuts edges of a.
+
+    False for other pairs.
+    """
+    if isinstance(a, resolved.Sphere):
+        return _cuts_sphere(a, b, tolerance)
+    edges = _triangles(a)
+    if edges is None:
+        return False
+    corners = edges[0][edges[1]]
+    starts, ends = corners.reshape(-1, 3), corners[:, [1, 2, 0]].reshape(-1, 3)
+    if isinstance(b, resolved.Convex):
+        outside = (signed_distance(b, edges[0]) > tolerance).any()
+        return bool(outside) and _enters(starts, ends, b, tolerance)
+    if isinstance(b, resolved.Mesh) and len(starts) * len(b.triangles) <= MOST_WORK:
+        triangles = np.array(b.vertices)[np.array(b.triangles)]
+        return any(_pierced(starts, ends, triangle, tolerance) for triangle in triangles)
+    return False
+
+
+def _cuts_sphere(a: resolved.Sphere, b: resolved.SolidShape, tolerance: float) -> bool:
+    polyhedron = _triangles(b)
+    if polyhedron is None:
+        return False
+    center = np.array([a.center])
+    nearest = distance(center, *polyhedron)[0]
+    farthest = np.linalg.norm(polyhedron[0] - center, axis=1).max()
+    return bool(nearest < a.radius - tolerance and farthest > a.radius + tolerance)
+
+
+def _enters(starts: Points, ends: Points, solid: resolved.Convex, tolerance: float) -> bool:
+    """Whether a part of any segment is deeper than `tolerance` inside a convex solid."""
+    planes = np.array(solid.planes)
+    before = starts @ planes[:, :3].T - planes[:, 3] + tolerance
+    after = ends @ planes[:, :3].T - planes[:, 3] + tolerance
+    with np.errstate(divide="ignore", invalid="ignore"):
+        crossing = before / (before - after)
+    first = np.where((before >= 0) & (after < 0), crossing, 0.0).max(axis=1)
+    last = np.where((before < 0) & (after >= 0), crossing, 1.0).min(axis=1)
+    beside = ((before >= 0) & (after >= 0)).any(axis=1)
+    return bool((~beside & (first < last)).any())
+
+
+def _pierced(starts: Points, ends: Points, triangle: Points, tolerance: float) -> bool:
+    """Whether any segment passes from one side of a triangle to the other, inside of it."""
+    a, b, c = triangle
+    normal = np.cross(b - a, c - a)
+    normal = normal / np.linalg.norm(normal)
+    before, after = (starts - a) @ normal, (ends - a) @ normal
+    through = ((before > tolerance) & (after < -tolerance)) | (
+        (before < -tolerance) & (after > tolerance)
+    )
+    if not through.any():
+        return False
+    start, end = starts[through], ends[through]
+    share = before[through] / (before[through] - after[through])
+    hit = start + share[:, None] * (end - start)
+    inside = np.ones(len(hit), dtype=bool)
+    for one, other in ((a, b), (b, c), (c, a)):
+        inward = np.cross(normal, other - one)
+        inside &= (hit - one) @ inward > tolerance * np.linalg.norm(inward)
+    return bool(inside.any())

@@ -101,10 +101,10 @@ def _checks(document: Table, renderers: Collection[str]) -> Iterator[Finding]:
             ("probe", probes),
         ):
             yield from _reference((*path, key), _text(check, key), known)
-        names = check.get("renderers")
-        for place, name in enumerate(names if isinstance(names, tuple) else ()):
-            if isinstance(name, str):
-                yield from _reference((*path, "renderers", place), name, renderers)
+        chosen = check.get("renderers")
+        for place, renderer in enumerate(chosen if isinstance(chosen, tuple) else ()):
+            if isinstance(renderer, str):
+                yield from _reference((*path, "renderers", place), renderer, renderers)
         for place, deviation in _rows(check, "known"):
             yield from _known(deviation, (*path, "known", place), renderers)
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from harness.errors import InputError, Problem
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tree_sitter import Node
 
 KeyPath = tuple[str | int, ...]
+Result = TypeVar("Result")
 
 LONGEST_VALUE = 80  # characters of a value that a message quotes
 
@@ -34,6 +35,10 @@ class Finding:
     expected: str | None = None
     suggestion: str | None = None
 
+    def below(self, path: KeyPath) -> Finding:
+        """The same finding, its path relative to `path`."""
+        return replace(self, path=(*path, *self.path))
+
 
 class SceneInvalid(Exception):
     """Raised inside the scene package; `load` and `resolve` turn it into an InputError."""
@@ -41,6 +46,25 @@ class SceneInvalid(Exception):
     def __init__(self, *findings: Finding) -> None:
         super().__init__("; ".join(f.message for f in findings))
         self.findings = findings
+
+
+class Attempts:
+    """Collects what is wrong in all parts of a scene, so that it is reported at once."""
+
+    def __init__(self) -> None:
+        self.findings: list[Finding] = []
+
+    def attempt(self, path: KeyPath, build: Callable[..., Result], *args: object) -> Result | None:
+        """The result of `build(*args)`, or None; what it finds is relative to `path`."""
+        try:
+            return build(*args)
+        except SceneInvalid as error:
+            self.findings += [finding.below(path) for finding in error.findings]
+            return None
+
+    def raise_any(self) -> None:
+        if self.findings:
+            raise SceneInvalid(*self.findings)
 
 
 def dotted(path: KeyPath) -> str:

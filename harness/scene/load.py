@@ -17,7 +17,7 @@ from harness.scene.expand import Permutation, expand
 from harness.scene.explain import findings_of
 from harness.scene.expressions import Value, is_expression
 from harness.scene.findings import Finding, problems, quoted
-from harness.scene.model import Case, Film
+from harness.scene.model import Case
 
 Quality = Literal["draft", "normal", "high"]
 QUALITIES: tuple[str, ...] = get_args(Quality)
@@ -125,8 +125,11 @@ def _scaled(model: Case, scale: float) -> Case:
     film = model.film
     if not film.scalable or scale == 1.0:
         return model
-    scaled = Film(
-        width=max(1, round(film.width * scale)), height=max(1, round(film.height * scale))
+    scaled = film.model_copy(
+        update={
+            "width": max(1, round(film.width * scale)),
+            "height": max(1, round(film.height * scale)),
+        }
     )
     return model.model_copy(update={"film": scaled})
 

@@ -11,15 +11,14 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+FARTHEST = 1e12  # of all numbers, so that no product of a few of them overflows
+
+Finite = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=FARTHEST, allow_inf_nan=False)]
 Unit = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Vec3 = tuple[Finite, Finite, Finite]
-Rgb = tuple[
-    Annotated[float, Field(ge=0, allow_inf_nan=False)],
-    Annotated[float, Field(ge=0, allow_inf_nan=False)],
-    Annotated[float, Field(ge=0, allow_inf_nan=False)],
-]
+NonNegative = Annotated[float, Field(ge=0, le=FARTHEST, allow_inf_nan=False)]
+Rgb = tuple[NonNegative, NonNegative, NonNegative]
 Reflectance = tuple[Unit, Unit, Unit]
 Name = Annotated[
     str,
@@ -232,7 +231,7 @@ Material = Annotated[
 class Medium(Strict):
     """`absorption` per scene unit and colour channel: T = exp(-absorption L)."""
 
-    ior: Positive
+    ior: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)]
     absorption: Rgb = (0, 0, 0)
 
 
@@ -290,8 +289,10 @@ class Transport(Strict):
 class Probe(Strict):
     """One isolated path, measured with the camera's rays.
 
-    `path` has a letter per interface: T transmit, R reflect. `planes` are the coded backdrops on
-    which rays are caught, each in a render of its own: two give the direction.
+    `path` has a letter per interface: T transmit, R reflect. `planes` are the backdrops on which
+    rays are caught, each in a render of its own. With `measure` "position" they carry position
+    codes of at most `cells` cells, and two of them give the direction; with "light" the first one
+    has radiance 1, so that a pixel shows the weight of the path.
     """
 
     name: Name
@@ -299,7 +300,8 @@ class Probe(Strict):
         str, Field(pattern=r"^[TR]*$", max_length=64, description="letters T and R, as in TRT")
     ]
     planes: Annotated[tuple[Rectangle, ...], Field(min_length=1, max_length=2)]
-    cells: Annotated[int, Field(ge=1, le=16384)] = 1000
+    measure: Literal["position", "light"] = "position"
+    cells: Annotated[int, Field(ge=1, le=16384)] = 4096
 
 
 # --- checks ---------------------------------------------------------------------------------------
@@ -317,15 +319,13 @@ class Known(Strict):
 class CheckSpec(Strict):
     """One comparison to make, for every renderer that can.
 
-    `against` is "truth" (closed form), "renderers" (every pair) or a renderer's name. `truth`
-    names the closed form where the observable allows several. Without `tolerance` it is derived.
+    `against` is "truth" (closed form), "renderers" (every pair) or a renderer's name. Without
+    `tolerance` it is derived; with it, `derivation` must say where it comes from.
     """
 
     observable: str
     against: str = "truth"
     probe: Name | None = None
-    truth: str | None = None
-    parameter: Finite | None = None
     tolerance: Positive | None = None
     derivation: str = ""
     renderers: tuple[str, ...] = ()

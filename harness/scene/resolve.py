@@ -3,36 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Literal, TypeVar
+from pathlib import Path
 
 from harness.scene import model, resolved
 from harness.scene.crosscheck import AIR
-from harness.scene.findings import Finding, KeyPath, SceneInvalid, input_error, quoted
+from harness.scene.findings import Attempts, Finding, SceneInvalid, input_error, quoted
 from harness.scene.load import LoadedCase
+from harness.scene.nesting import nested
 from harness.scene.resolved import ResolvedScene
-from harness.scene.shapes import rectangle, solid_shape, surface_shape
-from harness.scene.vectors import PARALLEL, cross, length, unit
-
-Result = TypeVar("Result")
-
-
-class _Problems:
-    """Collects what is wrong in all parts of a scene, so that it is reported at once."""
-
-    def __init__(self) -> None:
-        self.findings: list[Finding] = []
-
-    def attempt(self, path: KeyPath, build: Callable[[], Result]) -> Result | None:
-        """The result of `build`, or None; its findings are relative to `path`."""
-        try:
-            return build()
-        except SceneInvalid as error:
-            self.findings += [
-                Finding((*path, *f.path), f.message, f.value, f.expected, f.suggestion)
-                for f in error.findings
-            ]
-            return None
+from harness.scene.shapes import rectangle, slab, solid_shape, surface_shape
+from harness.scene.vectors import PARALLEL, combination, cross, length, unit
 
 
 def resolve(case: LoadedCase) -> ResolvedScene:
@@ -42,154 +22,197 @@ def resolve(case: LoadedCase) -> ResolvedScene:
     direction, meshes that are not closed, solids that overlap, a camera in an unsaid medium.
     """
     try:
-        return _resolve(case)
+        return _resolve(case.model, case.file.parent)
     except SceneInvalid as error:
         raise input_error(error.findings, case.file) from None
 
 
-def _resolve(case: LoadedCase) -> ResolvedScene:
-    scene, folder, problems = case.model, case.file.parent, _Problems()
-    media, index = _media(scene)
+def probe_planes(probe: model.Probe) -> tuple[resolved.Rectangle, ...]:
+    """The rectangles on which a probe's rays are caught."""
+    return tuple(map(rectangle, probe.planes))
+
+
+def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
+    attempts = Attempts()
+    media, medium_of = _media(case)
     shapes = [
-        problems.attempt(("solids", k, "shape"), lambda s=solid: solid_shape(s.shape, folder))
-        for k, solid in enumerate(scene.solids)
+        attempts.attempt(("solids", k, "shape"), solid_shape, solid.shape, folder)
+        for k, solid in enumerate(case.solids)
     ]
     faces = [
-        problems.attempt(("surfaces", k, "shape"), lambda s=face: surface_shape(s.shape, folder))
-        for k, face in enumerate(scene.surfaces)
+        attempts.attempt(("surfaces", k, "shape"), surface_shape, surface.shape, folder)
+        for k, surface in enumerate(case.surfaces)
     ]
-    camera = problems.attempt(("camera",), lambda: _camera(scene.camera))
-    if problems.findings:
-        raise SceneInvalid(*problems.findings)
-    solids = [
-        resolved.Solid(name=solid.name, shape=shape, medium=index[solid.medium], exterior=0)
-        for solid, shape in zip(scene.solids, shapes, strict=True)
+    materials = [
+        attempts.attempt(("surfaces", k, "material"), _material, surface, medium_of, folder)
+        for k, surface in enumerate(case.surfaces)
     ]
-    surfaces = [
-        resolved.Surface(name=face.name, shape=shape, material=_material(face.material, index))
-        for face, shape in zip(scene.surfaces, faces, strict=True)
-    ]
-    return ResolvedScene(
-        metres_per_unit=scene.metres_per_unit,
-        film=resolved.Film(width=scene.film.width, height=scene.film.height),
+    for k, probe in enumerate(case.probes):
+        for i, plane in enumerate(probe.planes):
+            attempts.attempt(("probes", k, "planes", i), rectangle, plane)
+    camera = attempts.attempt(("camera",), _camera, case.camera)
+    attempts.raise_any()
+    assert camera is not None
+    surfaces = tuple(
+        resolved.Surface(name=surface.name, shape=shape, material=material)
+        for surface, shape, material in zip(case.surfaces, faces, materials, strict=True)
+        if shape is not None and material is not None
+    )
+    scene = ResolvedScene(
+        metres_per_unit=case.metres_per_unit,
+        film=resolved.Film(width=case.film.width, height=case.film.height),
         camera=camera,
         media=media,
-        solids=tuple(solids),
-        surfaces=tuple(surfaces),
+        solids=tuple(
+            resolved.Solid(name=solid.name, shape=shape, medium=medium_of[solid.medium], exterior=0)
+            for solid, shape in zip(case.solids, shapes, strict=True)
+            if shape is not None
+        ),
+        surfaces=surfaces,
         lights=tuple(
             resolved.PointLight(position=light.position, intensity=light.intensity)
-            for light in scene.lights
+            for light in case.lights
         ),
-        background=scene.background,
+        background=case.background,
         transport=resolved.Transport(
-            max_depth=scene.transport.max_depth, min_weight=scene.transport.min_weight
+            max_depth=case.transport.max_depth, min_weight=case.transport.min_weight
         ),
     )
+    return nested(scene, case.camera.medium)
 
 
-def _media(scene: model.Case) -> tuple[tuple[resolved.Medium, ...], dict[str, int]]:
+# --- parts ----------------------------------------------------------------------------------------
+
+
+def _media(case: model.Case) -> tuple[tuple[resolved.Medium, ...], dict[str, int]]:
     """The media, air first unless the scene says what its air is; and their indices by name."""
-    names = [AIR, *(name for name in scene.media if name != AIR)]
-    defined = {AIR: model.Medium(ior=1.0), **scene.media}
+    defined = {AIR: model.Medium(ior=1.0), **case.media}
     media = tuple(
-        resolved.Medium(name=name, ior=defined[name].ior, absorption=defined[name].absorption)
-        for name in names
+        resolved.Medium(name=name, ior=medium.ior, absorption=medium.absorption)
+        for name, medium in defined.items()
     )
-    return media, {name: k for k, name in enumerate(names)}
+    return media, {name: k for k, name in enumerate(defined)}
 
 
 def _camera(camera: model.Camera) -> resolved.Camera:
-    towards = tuple(t - o for t, o in zip(camera.target, camera.origin, strict=True))
-    forward = unit(towards)
+    (ox, oy, oz), (tx, ty, tz) = camera.origin, camera.target
+    forward = unit((tx - ox, ty - oy, tz - oz))
     if forward is None:
-        raise SceneInvalid(
-            Finding(("target",), "is the camera's origin", quoted(list(camera.target)))
-        )
-    up = unit(camera.up)
-    across = cross(forward, up) if up is not None else (0.0, 0.0, 0.0)
-    if length(across) < PARALLEL:
+        target = quoted(list(camera.target))
+        raise SceneInvalid(Finding(("target",), "is where the camera's origin is", target))
+    across = cross(forward, camera.up)
+    right = unit(across)
+    if right is None or length(across) < PARALLEL * length(camera.up):
         raise SceneInvalid(
             Finding(
-                ("up",) if "up" in camera.model_fields_set else ("target",),
+                ("up",) if "up" in camera.model_fields_set else (),
                 "up is zero or parallel to the direction of view",
                 f"up = {quoted(list(camera.up))}",
-                "an up across the direction of view",
+                "an up across the direction of view, such as [0, 0, -1] to look down",
             )
         )
-    right = unit(across)
-    base = {
-        "origin": camera.origin,
-        "right": right,
-        "up": unit(cross(right, forward)),
-        "forward": forward,
-    }
+    up = cross(right, forward)
     if isinstance(camera, model.PerspectiveCamera):
-        k = math.tan(math.radians(camera.fov_x / 2))
-        return resolved.Perspective(**base, tan_half_fov_x=k)
-    return resolved.Orthographic(**base, width=camera.width)
+        return resolved.Perspective(
+            origin=camera.origin,
+            right=right,
+            up=up,
+            forward=forward,
+            tan_half_fov_x=math.tan(math.radians(camera.fov_x / 2)),
+        )
+    return resolved.Orthographic(
+        origin=camera.origin, right=right, up=up, forward=forward, width=camera.width
+    )
 
 
-def _material(material: model.Material, media: dict[str, int]) -> resolved.Material:
-    match material:
-        case model.Emissive():
-            pattern = material.pattern
-            kinds = {
-                model.Constant: resolved.Constant,
-                model.Checker: resolved.Checker,
-                model.Ramp: resolved.Ramp,
-            }
-            return resolved.Emissive(pattern=kinds[type(pattern)](**pattern.model_dump()))
-        case model.ThinSlab():
-            return resolved.ThinSlab(
-                medium=media[material.medium], exterior=0, thickness=material.thickness
+def _material(surface: model.Surface, medium_of: dict[str, int], folder: Path) -> resolved.Material:
+    flat = isinstance(surface.shape, model.Rectangle | model.Disk)
+    match surface.material:
+        case model.Emissive(pattern=pattern):
+            if not flat and not isinstance(pattern, model.Constant):
+                raise SceneInvalid(
+                    Finding(
+                        ("pattern", "type"),
+                        f"a pattern has no place on a {surface.shape.type}",
+                        quoted(pattern.type),
+                        "constant, or a rectangle or disk as the shape",
+                    )
+                )
+            return resolved.Emissive(pattern=_pattern(pattern, folder))
+        case model.Diffuse(reflectance=reflectance):
+            return resolved.Diffuse(reflectance=reflectance)
+        case model.Mirror(reflectance=reflectance):
+            return resolved.Mirror(reflectance=reflectance)
+        case model.Translucent() as translucent:
+            if translucent.filter + translucent.transmit > 1:
+                total = f"{translucent.filter:g} + {translucent.transmit:g}"
+                raise SceneInvalid(Finding(("transmit",), "filter + transmit above 1", total))
+            return resolved.Translucent(
+                color=translucent.color,
+                filter=translucent.filter,
+                transmit=translucent.transmit,
             )
-        case model.Diffuse():
-            return resolved.Diffuse(reflectance=material.reflectance)
-        case model.Mirror():
-            return resolved.Mirror(reflectance=material.reflectance)
-        case model.Translucent():
-            return resolved.Translucent(**material.model_dump())
+        case model.ThinSlab() as face:
+            if not flat:
+                kind = quoted(surface.shape.type)
+                raise SceneInvalid(
+                    Finding(("type",), "a thin slab is flat", kind, "a rectangle or disk")
+                )
+            return resolved.ThinSlab(
+                medium=medium_of[face.medium], exterior=0, thickness=face.thickness
+            )
 
 
-# --- scenes made from scenes ----------------------------------------------------------------------
+def _pattern(pattern: model.Pattern, folder: Path) -> resolved.Pattern:
+    match pattern:
+        case model.Constant():
+            return resolved.Constant(radiance=pattern.radiance)
+        case model.Checker():
+            return resolved.Checker(a=pattern.a, b=pattern.b, cells=pattern.cells)
+        case model.Ramp():
+            return resolved.Ramp(start=pattern.start, end=pattern.end, axis=pattern.axis)
+        case model.Picture():
+            from harness.scene.pictures import read_picture
+
+            try:
+                return read_picture(folder, pattern.file, pattern.encoding)
+            except SceneInvalid as error:
+                below = (finding.below(("pattern",)) for finding in error.findings)
+                raise SceneInvalid(*below) from error
 
 
-def probe_planes(probe: model.Probe) -> tuple[resolved.Rectangle, ...]:
-    """The rectangles on which a probe's rays are caught."""
-    return tuple(rectangle(plane) for plane in probe.planes)
+# --- thin slabs -----------------------------------------------------------------------------------
 
 
-def with_code_plane(
-    scene: ResolvedScene,
-    probe_plane: resolved.Rectangle,
-    axis: Literal["u", "v"],
-    cells: int,
-    amplitude: float,
-    path: str,
-) -> ResolvedScene:
-    """The probe scene: everything black but `probe_plane`, which shows where rays land on it.
+def expand_thin_slabs(scene: ResolvedScene) -> ResolvedScene:
+    """The same scene with a real slab for each thin one, for renderers without thin slabs.
 
-    Of the surfaces only mirrors and thin slabs stay. Light is followed just as far as `path`
-    needs (a letter per interface, T or R), and lobes that it does not take are switched off.
+    The slab lies behind the face. Only its edges differ from the thin slab, which has none.
     """
-    code = resolved.PositionCode(axis=axis, cells=cells, amplitude=amplitude)
-    plane = resolved.Surface(
-        name="code-plane", shape=probe_plane, material=resolved.Emissive(pattern=code)
-    )
-    kept = (
-        s for s in scene.surfaces if isinstance(s.material, resolved.ThinSlab | resolved.Mirror)
-    )
-    transport = resolved.Transport(
-        max_depth=len(path) + 1,
-        min_weight=scene.transport.min_weight,
-        reflection="R" in path,
-        transmission="T" in path,
-    )
-    return scene.model_copy(
-        update={
-            "surfaces": (*kept, plane),
-            "lights": (),
-            "background": (0.0, 0.0, 0.0),
-            "transport": transport,
-        }
-    )
+    names = {solid.name for solid in scene.solids}
+    solids = list(scene.solids)
+    for surface in scene.surfaces:
+        if isinstance(surface.material, resolved.ThinSlab):
+            name = surface.name
+            while name in names:
+                name += "-slab"
+            names.add(name)
+            solids.append(_real_slab(name, surface.shape, surface.material))
+    kept = (s for s in scene.surfaces if not isinstance(s.material, resolved.ThinSlab))
+    return scene.model_copy(update={"solids": tuple(solids), "surfaces": tuple(kept)})
+
+
+def _real_slab(name: str, face: resolved.SurfaceShape, thin: resolved.ThinSlab) -> resolved.Solid:
+    shape: resolved.SolidShape
+    if isinstance(face, resolved.Rectangle):
+        shape = slab(face.frame, face.size, thin.thickness)
+    elif isinstance(face, resolved.Disk):
+        middle = combination(face.frame.origin, (-thin.thickness / 2,), (face.frame.z,))
+        shape = resolved.Cylinder(
+            frame=face.frame.model_copy(update={"origin": middle}),
+            radius=face.radius,
+            height=thin.thickness,
+        )
+    else:
+        raise TypeError(f"a thin slab on a {face.type}")
+    return resolved.Solid(name=name, shape=shape, medium=thin.medium, exterior=thin.exterior)

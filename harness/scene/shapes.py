@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from harness.scene import model, resolved
 from harness.scene.degrees import cosd, sind
@@ -17,12 +21,17 @@ from harness.scene.vectors import (
     Matrix,
     any_frame,
     combination,
+    difference,
     exact_dot,
     frame,
+    length,
     product,
     rotation,
     turned,
 )
+
+if TYPE_CHECKING:
+    from harness.scene.tessellation import Points, Triangles
 
 X, Y, Z = IDENTITY
 Faces = Sequence[tuple[int, ...]]
@@ -57,10 +66,10 @@ def solid_shape(shape: model.SolidShape, folder: Path) -> resolved.SolidShape:
             return polygons(_convex(shape.of))
         case model.Cylinder():
             return _cylinder(shape)
-        case _:
-            from harness.scene.meshes import mesh_shape
-
-            return mesh_shape(shape, turn_of(shape), folder)
+        case model.Icosphere():
+            return _icosphere(shape)
+        case model.MeshFile() | model.MeshData():
+            return _closed(_mesh(shape, folder), shape)
 
 
 def surface_shape(shape: model.SurfaceShape, folder: Path) -> resolved.SurfaceShape:
@@ -69,6 +78,8 @@ def surface_shape(shape: model.SurfaceShape, folder: Path) -> resolved.SurfaceSh
         return rectangle(shape)
     if isinstance(shape, model.Disk):
         return resolved.Disk(frame=_face_frame(shape), radius=shape.radius)
+    if isinstance(shape, model.MeshFile | model.MeshData):
+        return _mesh(shape, folder)
     return solid_shape(shape, folder)
 
 
@@ -204,3 +215,87 @@ def polygons(shape: resolved.Convex) -> resolved.Mesh:
         (face[0], face[k], face[k + 1]) for face in shape.faces for k in range(1, len(face) - 1)
     )
     return resolved.Mesh(vertices=shape.vertices, triangles=triangles)
+
+
+# --- meshes ---------------------------------------------------------------------------------------
+
+
+def _icosphere(shape: model.Icosphere) -> resolved.Mesh:
+    from harness.scene.tessellation import icosphere, placed
+
+    directions, triangles = icosphere(shape.subdivisions)
+    directions = placed(directions, turn_of(shape), (0.0, 0.0, 0.0))
+    vertices = placed(directions * shape.radius, IDENTITY, _vec(shape.center))
+    return resolved.Mesh(
+        vertices=_rows(vertices),
+        triangles=_rows(triangles),
+        normals=_rows(directions) if shape.smooth else None,
+    )
+
+
+def _mesh(shape: model.MeshFile | model.MeshData, folder: Path) -> resolved.Mesh:
+    """A mesh that may be open."""
+    from harness.scene.tessellation import placed, vertex_normals
+
+    if isinstance(shape, model.MeshFile):
+        from harness.scene.meshfile import read_mesh
+
+        vertices, triangles = read_mesh(folder, shape.file)
+        vertices, origin = vertices * shape.scale, _vec(shape.translate)
+    else:
+        vertices, triangles = _written_out(shape)
+        origin = (0.0, 0.0, 0.0)
+    vertices = placed(vertices, turn_of(shape), origin)
+    if np.abs(vertices).max() > model.FARTHEST:
+        raise SceneInvalid(Finding((), f"coordinates above {model.FARTHEST:g}"))
+    normals = _rows(vertex_normals(vertices, triangles)) if shape.smooth else None
+    return resolved.Mesh(vertices=_rows(vertices), triangles=_rows(triangles), normals=normals)
+
+
+def _written_out(shape: model.MeshData) -> tuple[Points, Triangles]:
+    vertices = np.array(shape.vertices, dtype=np.float64)
+    for index, triangle in enumerate(shape.triangles):
+        if not all(0 <= k < len(vertices) for k in triangle):
+            expected = f"indices from 0 to {len(vertices) - 1}"
+            where = ("triangles", index)
+            raise SceneInvalid(Finding(where, "no such vertex", quoted(list(triangle)), expected))
+    return vertices, np.array(shape.triangles, dtype=np.int64)
+
+
+def _closed(mesh: resolved.Mesh, shape: model.MeshFile | model.MeshData) -> resolved.Mesh:
+    """The mesh where it bounds one solid; raises SceneInvalid."""
+    from harness.scene.mesh import closed_solid_problems
+
+    problems = closed_solid_problems(np.array(mesh.vertices), np.array(mesh.triangles))
+    if problems:
+        key = ("file",) if isinstance(shape, model.MeshFile) else ("triangles",)
+        raise SceneInvalid(
+            *(Finding(key, f"not the surface of one solid: {problem}") for problem in problems)
+        )
+    return mesh
+
+
+def _rows(array: NDArray[Any]) -> Any:
+    return array.tolist()  # which the models turn into tuples
+
+
+# --- sizes ----------------------------------------------------------------------------------------
+
+
+def smallest_feature(shape: resolved.SurfaceShape) -> float:
+    """The smallest radius, thickness or side of a shape."""
+    match shape:
+        case resolved.Sphere() | resolved.Disk():
+            return shape.radius
+        case resolved.Cylinder():
+            return min(shape.radius, shape.height)
+        case resolved.Rectangle():
+            return min(shape.size)
+        case resolved.Mesh():
+            return float(np.ptp(np.array(shape.vertices), axis=0).max())
+        case resolved.Convex():
+            return min(
+                length(difference(shape.vertices[i], shape.vertices[j]))
+                for face in shape.faces
+                for i, j in zip(face, (*face[1:], face[0]), strict=True)
+            )

@@ -17,6 +17,7 @@ Matrix = tuple[Vec3, Vec3, Vec3]  # rows
 
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
+SHORTEST = 1e-100  # a shorter vector has too few digits for a direction
 PARALLEL = 1e-6  # sine of an angle below which two directions define no frame
 
 
@@ -45,6 +46,10 @@ def combination(origin: Vec3, scales: Sequence[float], axes: Sequence[Vec3]) -> 
     return x, y, z
 
 
+def difference(a: Vec3, b: Vec3) -> Vec3:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
 def length(a: Vec3) -> float:
     return math.hypot(*a)
 
@@ -52,7 +57,7 @@ def length(a: Vec3) -> float:
 def unit(a: Vec3) -> Vec3 | None:
     """`a` at length 1; None where it has no direction."""
     size = length(a)
-    if size == 0.0:
+    if size < SHORTEST:
         return None
     x, y, z = (component / size + 0.0 for component in a)  # + 0.0 turns -0.0 into 0.0
     return x, y, z
