@@ -1,0 +1,100 @@
+"""Our own tracer as a renderer. A worker process hosts `TracerEngine`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+import tracer
+from harness.errors import RendererFailed
+from harness.record import write_text
+from harness.renderers.base import Capability, Health, Image, RayPaths, Rays, RenderSettings
+from harness.scene import resolved
+from harness.scene.resolved import ResolvedScene
+
+# All but RADIANCE_N2: radiance is not scaled with the square of the index, as in POV-Ray.
+CAPABILITIES = frozenset(Capability) - {Capability.RADIANCE_N2}
+
+
+class TracerEngine:
+    """Deterministic: the same bits for any number of threads."""
+
+    name = "tracer"
+    capabilities = CAPABILITIES
+
+    def version(self) -> str:
+        return tracer.__version__
+
+    def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
+        """Raises RendererFailed for a scene that the tracer refuses."""
+        from harness.translate.tracer import translate
+
+        start = time.perf_counter()
+        film = scene.film
+        try:
+            image = tracer.render(translate(scene), film.width, film.height, settings.threads)
+        except tracer.SceneError as error:
+            raise RendererFailed(f"the tracer refuses the scene: {error}") from error
+        cut = float(image.cut.mean())
+        return Image(
+            pixels=image.pixels.astype(np.float32),
+            seconds=time.perf_counter() - start,
+            log=f"mean weight cut by max_depth and min_weight: {cut:.3g}",
+        )
+
+    def trace(
+        self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
+    ) -> RayPaths:
+        """Follows rays along `path`, with all vertices."""
+        from harness.translate.tracer import translate
+
+        try:
+            found = tracer.follow(
+                translate(scene),
+                rays.origins,
+                rays.directions,
+                path,
+                vertices=True,
+                threads=settings.threads,
+            )
+        except tracer.SceneError as error:
+            raise RendererFailed(f"the tracer refuses the rays: {error}") from error
+        return RayPaths(
+            status=found.status,
+            surface=found.surface,
+            point=found.point,
+            direction=found.direction,
+            weight=found.weight,
+            optical_length=found.optical_length,
+            vertices=found.vertices,
+        )
+
+    def emit(self, scene: ResolvedScene, folder: Path) -> Path:
+        """The tracer is called in its own process; what it is given is the scene itself."""
+        file = folder / "scene.json"
+        write_text(file, scene.model_dump_json(indent=1) + "\n")
+        return file
+
+    def health(self) -> Health:
+        """Renders a grey background; the first time this compiles the kernels."""
+        try:
+            pixels = self.render(_grey_world(), RenderSettings()).pixels
+        except Exception as error:  # whatever it is, the doctor shall hear of it
+            return Health(self.name, usable=False, version=self.version(), detail=str(error))
+        usable = bool((pixels == np.float32(0.5)).all())
+        detail = "" if usable else f"a grey world of 0.5 was rendered as {pixels.mean():.6g}"
+        return Health(self.name, usable, self.version(), str(Path(tracer.__file__).parent), detail)
+
+
+def _grey_world() -> ResolvedScene:
+    return ResolvedScene(
+        film=resolved.Film(width=4, height=4),
+        camera=resolved.Perspective(
+            origin=(0, 0, 0), right=(1, 0, 0), up=(0, 1, 0), forward=(0, 0, -1), tan_half_fov_x=1
+        ),
+        media=(resolved.Medium(name="vacuum", ior=1.0),),
+        background=(0.5, 0.5, 0.5),
+        transport=resolved.Transport(max_depth=1, min_weight=0.0),
+    )

@@ -1,0 +1,117 @@
+"""ResolvedScene -> tracer.scene.Scene: a change of names, never of numbers."""
+
+from __future__ import annotations
+
+import base64
+
+import numpy as np
+
+import tracer.camera
+import tracer.mesh
+import tracer.patterns
+import tracer.scene
+import tracer.shapes
+from harness.scene import resolved
+
+
+def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
+    """The scene as our tracer reads it. Raises tracer.errors.SceneError for what it refuses."""
+    media = [tracer.scene.Medium(m.ior, m.absorption) for m in scene.media]
+    transport = scene.transport
+    return tracer.scene.Scene(
+        camera=_camera(scene.camera),
+        solids=tuple(
+            tracer.scene.Solid(_solid_shape(s.shape), media[s.medium], media[s.exterior], s.name)
+            for s in scene.solids
+        ),
+        surfaces=tuple(
+            tracer.scene.Surface(_shape(s.shape), _material(s.material, media), s.name)
+            for s in scene.surfaces
+        ),
+        lights=tuple(
+            tracer.scene.PointLight(light.position, light.intensity) for light in scene.lights
+        ),
+        background=scene.background,
+        around_camera=media[scene.camera.medium],
+        transport=tracer.scene.Transport(
+            max_depth=transport.max_depth,
+            min_weight=transport.min_weight,
+            reflection=transport.reflection,
+            transmission=transport.transmission,
+        ),
+    )
+
+
+def _camera(
+    camera: resolved.Camera,
+) -> tracer.camera.Perspective | tracer.camera.Orthographic:
+    axes = camera.origin, camera.right, camera.up, camera.forward
+    match camera:
+        case resolved.Perspective():
+            return tracer.camera.Perspective(*axes, camera.tan_half_fov_x)
+        case resolved.Orthographic():
+            return tracer.camera.Orthographic(*axes, camera.width)
+
+
+def _solid_shape(
+    shape: resolved.SolidShape,
+) -> tracer.shapes.Sphere | tracer.shapes.Cell | tracer.mesh.Mesh:
+    match shape:
+        case resolved.Sphere():
+            return tracer.shapes.Sphere(shape.center, shape.radius)
+        case resolved.Convex():
+            planes = [tracer.shapes.Plane((x, y, z), d) for x, y, z, d in shape.planes]
+            return tracer.shapes.polyhedron(planes, list(shape.vertices))
+        case resolved.Cylinder():
+            frame = shape.frame
+            return tracer.shapes.cylinder(frame.origin, frame.z, shape.radius, shape.height)
+        case resolved.Mesh():
+            normals = None if shape.normals is None else np.array(shape.normals, float)
+            return tracer.mesh.Mesh(
+                np.array(shape.vertices, float), np.array(shape.triangles, np.int64), normals
+            )
+
+
+def _shape(shape: resolved.SurfaceShape) -> tracer.scene.Shape:
+    match shape:
+        case resolved.Rectangle(frame=f):
+            return tracer.shapes.Rectangle(f.origin, f.x, f.y, f.z, shape.size)
+        case resolved.Disk(frame=f):
+            return tracer.shapes.Disk(f.origin, f.x, f.y, f.z, shape.radius)
+        case _:
+            return _solid_shape(shape)
+
+
+def _material(
+    material: resolved.Material, media: list[tracer.scene.Medium]
+) -> tracer.scene.Material:
+    match material:
+        case resolved.Emissive():
+            return tracer.scene.Emissive(_pattern(material.pattern))
+        case resolved.Diffuse():
+            return tracer.scene.Diffuse(material.reflectance)
+        case resolved.Mirror():
+            return tracer.scene.Mirror(material.reflectance)
+        case resolved.Translucent():
+            return tracer.scene.Translucent(material.color, material.filter, material.transmit)
+        case resolved.ThinSlab():
+            return tracer.scene.ThinSlab(
+                media[material.medium], material.thickness, media[material.exterior]
+            )
+
+
+def _pattern(pattern: resolved.Pattern) -> tracer.patterns.Pattern:
+    match pattern:
+        case resolved.Constant():
+            return tracer.patterns.Constant(pattern.radiance)
+        case resolved.Checker():
+            return tracer.patterns.Checker(pattern.a, pattern.b, pattern.cells)
+        case resolved.Ramp():
+            return tracer.patterns.Ramp(pattern.start, pattern.end, pattern.axis)
+        case resolved.PositionCode():
+            return tracer.patterns.PositionCode(pattern.axis, pattern.cells, pattern.amplitude)
+        case resolved.Picture():
+            levels = np.frombuffer(base64.b64decode(pattern.pixels), "<u2")
+            return tracer.patterns.Picture(
+                levels.reshape(pattern.height, pattern.width, 3) / 65535.0
+            )

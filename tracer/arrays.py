@@ -1,0 +1,193 @@
+"""A scene as flat arrays of numbers, the form that the kernels read."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracer.errors import SceneError
+from tracer.mesh import Mesh, Tree, grow_tree, require_closed
+from tracer.patterns import Constant, Picture, pattern_row
+from tracer.scene import (
+    VACUUM,
+    Diffuse,
+    Emissive,
+    Material,
+    Medium,
+    Mirror,
+    Scene,
+    Shape,
+    Solid,
+    Surface,
+    ThinSlab,
+    Translucent,
+)
+from tracer.shapes import COLUMNS, Cell, Disk, Rectangle, Sphere, bound_row, face_row
+
+Floats = NDArray[np.float64]
+
+# Kinds of shapes, and of what they bound.
+SPHERE, CELL, MESH, RECTANGLE, DISK = range(5)
+DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
+
+# Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
+SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS = range(8)
+
+
+class Arrays(NamedTuple):
+    """One row of `objects`, `balls` and `materials` per solid, then per surface."""
+
+    objects: NDArray[np.int64]  # (n, 8)
+    balls: Floats  # (n, 4): centre and squared radius of a sphere around a cell
+    materials: Floats  # (n, 7): two colours and a thickness
+    rows: Floats  # shapes
+    media: Floats  # (m, 4): ior, absorption
+    patterns: Floats
+    texels: Floats
+    lights: Floats  # (l, 6): position, intensity
+    background: Floats  # (1, 3)
+    boxes: NDArray[np.float32]  # nodes of all meshes' trees
+    children: NDArray[np.int32]
+    triangles: Floats
+    normals: Floats
+
+
+class _Flattener:
+    """Collects rows while it walks over a scene."""
+
+    def __init__(self) -> None:
+        self.objects: list[list[int]] = []
+        self.balls: list[list[float]] = []
+        self.materials: list[list[float]] = []
+        self.rows: list[list[float]] = []
+        self.media: list[Medium] = []
+        self.patterns: list[list[float]] = []
+        self.texels: list[Floats] = [np.empty((0, 3))]
+        self.trees: list[Tree] = []
+        self.nodes = self.triangles = self.normals = self.texel_count = 0
+
+    def medium(self, medium: Medium) -> int:
+        if medium not in self.media:
+            self.media.append(medium)
+        return self.media.index(medium)
+
+    def solid(self, solid: Solid) -> None:
+        if isinstance(solid.shape, Mesh):
+            require_closed(solid.shape, solid.name)
+        media = self.medium(solid.medium), self.medium(solid.exterior)
+        self._object(solid.shape, DIELECTRIC, media, -1, [0.0] * 7)
+
+    def surface(self, surface: Surface) -> None:
+        kind, media, pattern, row = self._material(surface)
+        self._object(surface.shape, kind, media, pattern, row)
+
+    def _material(self, surface: Surface) -> tuple[int, tuple[int, int], int, list[float]]:
+        material: Material = surface.material
+        none = (0.0, 0.0, 0.0)
+        match material:
+            case Emissive(pattern):
+                flat = isinstance(surface.shape, Rectangle | Disk)
+                if not flat and not isinstance(pattern, Constant):
+                    raise SceneError(
+                        f"{surface.name}: only rectangles and disks can show a pattern, "
+                        f"a {type(surface.shape).__name__} emits a constant radiance"
+                    )
+                self.patterns.append(pattern_row(pattern, self.texel_count))
+                if isinstance(pattern, Picture):
+                    self.texels.append(pattern.pixels.reshape(-1, 3))
+                    self.texel_count += len(self.texels[-1])
+                return EMISSIVE, (0, 0), len(self.patterns) - 1, [0.0] * 7
+            case Diffuse(reflectance):
+                return DIFFUSE, (0, 0), -1, [*reflectance, *none, 0.0]
+            case Mirror(reflectance):
+                return MIRROR, (0, 0), -1, [*reflectance, *none, 0.0]
+            case Translucent(color, filtered, clear):
+                passes = [filtered * c + clear for c in color]
+                stays = [(1.0 - filtered - clear) * c for c in color]
+                return TRANSLUCENT, (0, 0), -1, [*passes, *stays, 0.0]
+            case ThinSlab(medium, thickness, exterior):
+                if not isinstance(surface.shape, Rectangle | Disk):
+                    raise SceneError(f"{surface.name}: a thin slab must be a rectangle or a disk")
+                media = self.medium(medium), self.medium(exterior)
+                return THIN_SLAB, media, -1, [*none, *none, thickness]
+
+    def _object(
+        self,
+        shape: Shape,
+        material: int,
+        media: tuple[int, int],
+        pattern: int,
+        material_row: list[float],
+    ) -> None:
+        first, count, normals = len(self.rows), 1, -1
+        ball = [0.0, 0.0, 0.0, np.inf]
+        match shape:
+            case Sphere(center, radius):
+                kind = SPHERE
+                self.rows.append([*center, radius])
+            case Cell(bounds, center, radius):
+                kind, count = CELL, len(bounds)
+                ball = [*center, radius * radius * (1.0 + 1e-9)]
+                self.rows += [bound_row(bound) for bound in bounds]
+            case Rectangle() | Disk():
+                kind = DISK if isinstance(shape, Disk) else RECTANGLE
+                self.rows.append(face_row(shape))
+            case Mesh():
+                kind, first, count = MESH, self.nodes, self.triangles
+                normals = self._tree(grow_tree(shape))
+        self.objects.append([kind, first, count, material, *media, pattern, normals])
+        self.balls.append(ball)
+        self.materials.append(material_row)
+
+    def _tree(self, tree: Tree) -> int:
+        """Moves a tree behind the ones that are there; returns the row of its first normal."""
+        inner = tree.children >= 0
+        tree.children[inner] += self.nodes
+        tree.children[~inner] -= 8 * self.triangles
+        first_normal = self.normals if len(tree.normals) else -1
+        self.trees.append(tree)
+        self.nodes += len(tree.boxes)
+        self.triangles += len(tree.triangles)
+        self.normals += len(tree.normals)
+        return first_normal
+
+
+def _table(rows: list[list[float]], columns: int) -> Floats:
+    table = np.zeros((len(rows), columns))
+    for k, row in enumerate(rows):
+        table[k, : len(row)] = row
+    return table
+
+
+def flatten(scene: Scene) -> Arrays:
+    """Raises SceneError for what cannot be traced. `media[0]` is what the camera stands in."""
+    into = _Flattener()
+    into.medium(scene.around_camera)
+    into.medium(VACUUM)
+    for solid in scene.solids:
+        into.solid(solid)
+    for surface in scene.surfaces:
+        into.surface(surface)
+    trees = into.trees or [_NO_TREE]
+    return Arrays(
+        objects=np.array(into.objects, np.int64).reshape(-1, 8),
+        balls=_table(into.balls, 4),
+        materials=_table(into.materials, 7),
+        rows=_table(into.rows, COLUMNS),
+        media=_table([[m.ior, *m.absorption] for m in into.media], 4),
+        patterns=_table(into.patterns, 9),
+        texels=np.ascontiguousarray(np.concatenate(into.texels), float),
+        lights=_table([[*light.position, *light.intensity] for light in scene.lights], 6),
+        background=_table([list(scene.background)], 3),
+        boxes=np.concatenate([tree.boxes for tree in trees]),
+        children=np.concatenate([tree.children for tree in trees]),
+        triangles=np.concatenate([tree.triangles for tree in trees]),
+        normals=np.concatenate([tree.normals for tree in trees]),
+    )
+
+
+_NO_TREE = Tree(
+    np.empty((0, 12), np.float32), np.empty((0, 2), np.int32), np.empty((0, 9)), np.empty((0, 9))
+)

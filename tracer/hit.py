@@ -1,0 +1,167 @@
+"""The nearest thing that a ray meets, and what the surface is like there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracer.arrays import (
+    CELL,
+    COUNT,
+    DISK,
+    FIRST,
+    MESH,
+    NORMALS,
+    SHAPE,
+    SPHERE,
+    Arrays,
+    Floats,
+)
+from tracer.compiled import compiled
+from tracer.mesh import STACK, mesh_hit, smooth_normal, triangle_normal
+from tracer.shapes import (
+    INF,
+    bound_normal,
+    cell_stretch,
+    face_distance,
+    sphere_stretch,
+    vec_at,
+)
+from tracer.vector import Vec, along, dot, normalise, scale, sub
+
+NOTHING = -1
+
+
+@compiled
+def new_stack() -> Floats:
+    """Room for walking down meshes' trees; one per thread."""
+    return np.empty((STACK, 2))
+
+
+@compiled
+def nearest_hit(
+    scene: Arrays,
+    o: Vec,
+    d: Vec,
+    left: int,
+    left_face: int,
+    inward: bool,
+    stack: Floats,
+) -> tuple[int, int, float, bool]:
+    """(object, face, distance, entering), object NOTHING and distance infinite if all is missed.
+
+    The ray has just left face `left_face` of object `left`, heading to the inside of it if
+    `inward`; or nothing, if `left` is NOTHING. `entering` says that the ray comes from outside
+    the hit solid, or from the front of the hit face.
+    """
+    best, hit, hit_face, hit_entering = INF, NOTHING, -1, False
+    for i in range(len(scene.objects)):
+        kind = scene.objects[i, SHAPE]
+        on_face = left_face if i == left else -1
+        if kind == MESH:
+            t, face, entering = _mesh_hit(scene, i, o, d, on_face, inward, best, stack)
+        elif on_face >= 0 and not (inward and kind <= CELL):
+            continue  # nothing of a convex solid lies outwards; a face is not met twice
+        elif kind == SPHERE:
+            t, face, entering = _sphere_hit(scene, i, o, d, on_face)
+        elif kind == CELL:
+            t, face, entering = _cell_hit(scene, i, o, d, on_face)
+        else:
+            t, face, entering = _face_hit(scene, i, o, d, kind == DISK)
+        if t < best:
+            best, hit, hit_face, hit_entering = t, i, face, entering
+    return hit, hit_face, best, hit_entering
+
+
+# What a ray meets of one object: (distance, face, entering), infinite distance if it misses.
+# Where on_face >= 0, it has just left that face of the object and heads inwards.
+
+
+@compiled
+def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
+    row = scene.objects[i, FIRST]
+    center, radius = vec_at(scene.rows, row, 0), scene.rows[row, 3]
+    if on_face >= 0:
+        return max(0.0, -2.0 * dot(sub(o, center), d)), 0, False
+    enter, leave = sphere_stretch(o, d, center, radius)
+    if enter > 0.0:
+        return enter, 0, True
+    return (leave if leave > 0.0 else INF), 0, False
+
+
+@compiled
+def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
+    if on_face < 0:
+        to_center = sub(vec_at(scene.balls, i, 0), o)
+        ahead = dot(to_center, d)
+        if dot(to_center, to_center) - ahead * ahead > scene.balls[i, 3]:
+            return INF, -1, False
+    enter, face_in, leave, face_out = cell_stretch(
+        o, d, scene.rows, scene.objects[i, FIRST], scene.objects[i, COUNT], on_face
+    )
+    if on_face >= 0:
+        return leave, face_out, False
+    if enter >= leave or leave <= 0.0:
+        return INF, -1, False
+    if enter > 0.0:
+        return enter, face_in, True
+    return leave, face_out, False
+
+
+@compiled
+def _mesh_hit(
+    scene: Arrays,
+    i: int,
+    o: Vec,
+    d: Vec,
+    on_face: int,
+    inward: bool,
+    best: float,
+    stack: Floats,
+) -> tuple[float, int, bool]:
+    t, triangle, side = mesh_hit(
+        o,
+        d,
+        scene.boxes,
+        scene.children,
+        scene.triangles,
+        scene.objects[i, FIRST],
+        on_face,
+        -1 if inward else 1,
+        best,
+        stack,
+    )
+    return t, triangle, side > 0
+
+
+@compiled
+def _face_hit(scene: Arrays, i: int, o: Vec, d: Vec, is_disk: bool) -> tuple[float, int, bool]:
+    row = scene.objects[i, FIRST]
+    entering = dot(d, vec_at(scene.rows, row, 9)) < 0.0
+    return face_distance(o, d, scene.rows, row, is_disk), 0, entering
+
+
+@compiled
+def hit_point(
+    scene: Arrays, o: Vec, t: float, d: Vec, hit: int, face: int, entering: bool
+) -> tuple[Vec, Vec, Vec]:
+    """(point, shading normal, geometric normal), unit, on the side that the ray comes from."""
+    kind, first = scene.objects[hit, SHAPE], scene.objects[hit, FIRST]
+    p = along(o, t, d)
+    if kind == SPHERE:
+        center = vec_at(scene.rows, first, 0)
+        n = normalise(sub(p, center))
+        p = along(center, scene.rows[first, 3], n)  # back onto the sphere, to the last bit
+    elif kind == CELL:
+        n = bound_normal(p, scene.rows, first + face)
+    elif kind == MESH:
+        n = triangle_normal(scene.triangles, face)
+    else:
+        n = vec_at(scene.rows, first, 9)
+    side = 1.0 if entering else -1.0
+    facing = scale(side, n)
+    row = scene.objects[hit, NORMALS]
+    if kind != MESH or row < 0:
+        return p, facing, facing
+    row += face - scene.objects[hit, COUNT]
+    smooth = smooth_normal(p, scene.triangles, face, scene.normals, row)
+    return p, scale(side, smooth), facing

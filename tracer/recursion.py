@@ -1,0 +1,181 @@
+"""Images by double recursion: at every dielectric a ray becomes two.
+
+The recursion is unrolled onto an explicit stack of rays that wait. It is cut where a ray would
+have more than `max_depth` segments or carry less than `min_weight`. What is cut is added up per
+pixel: image and cut together bound what a recursion without end would show.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracer.arrays import Arrays, Floats, flatten
+from tracer.camera import camera_row, pixel_centre, primary_ray
+from tracer.compiled import compiled
+from tracer.hit import NOTHING, nearest_hit, new_stack
+from tracer.light import absorbed
+from tracer.scene import Scene
+from tracer.shapes import vec_at
+from tracer.surface import BLACK, Lobes, scatter
+from tracer.threads import for_bands
+from tracer.vector import Vec, add, mul
+
+BAND = 4  # rows of pixels that a thread takes at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Render:
+    """`pixels` (H, W, 3) radiance, row 0 at the top; `cut` (H, W), the weight not followed.
+
+    In a world of radiance 1 without absorption, pixels + cut is 1.
+    """
+
+    pixels: Floats
+    cut: Floats
+
+
+class Limits(NamedTuple):
+    max_depth: int
+    min_weight: float
+
+
+class Waiting(NamedTuple):
+    """Rays that wait to be followed. There are never more than `max_depth`."""
+
+    floats: Floats  # (depth, 9): origin, direction, weight
+    ints: NDArray[np.int64]  # (depth, 5): segments, medium, left, left_face, inward
+
+
+@compiled
+def _push(
+    waiting: Waiting,
+    at: int,
+    o: Vec,
+    d: Vec,
+    weight: Vec,
+    segments: int,
+    medium: int,
+    left: int,
+    left_face: int,
+    inward: bool,
+) -> None:
+    for k in range(3):
+        waiting.floats[at, k] = o[k]
+        waiting.floats[at, 3 + k] = d[k]
+        waiting.floats[at, 6 + k] = weight[k]
+    ints = waiting.ints
+    ints[at, 0], ints[at, 1], ints[at, 2] = segments, medium, left
+    ints[at, 3], ints[at, 4] = left_face, inward
+
+
+@compiled
+def radiance(
+    scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
+) -> tuple[Vec, float]:
+    """(radiance that arrives at `o` against the direction `d`, weight cut); starts in medium 0."""
+    seen, cut = BLACK, 0.0
+    _push(waiting, 0, o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
+    height = 1
+    while height > 0:
+        height -= 1
+        o, d = vec_at(waiting.floats, height, 0), vec_at(waiting.floats, height, 3)
+        weight = vec_at(waiting.floats, height, 6)
+        segments, medium = waiting.ints[height, 0], waiting.ints[height, 1]
+        left, left_face = waiting.ints[height, 2], waiting.ints[height, 3]
+        inward = waiting.ints[height, 4] != 0
+
+        hit, face, t, entering = nearest_hit(scene, o, d, left, left_face, inward, stack)
+        weight = mul(weight, absorbed(scene.media, medium, t))
+        if hit == NOTHING:
+            seen = add(seen, mul(weight, vec_at(scene.background, 0, 0)))
+            continue
+        at = scatter(scene, lobes, o, t, d, medium, hit, face, entering, stack)
+        seen = add(seen, mul(weight, at.sent))
+
+        onward = mul(weight, at.reflected)
+        strength = max(onward[0], onward[1], onward[2])
+        if strength > 0.0:
+            if segments < limits.max_depth and strength >= limits.min_weight:
+                _push(
+                    waiting,
+                    height,
+                    at.p,
+                    at.wr,
+                    onward,
+                    segments + 1,
+                    at.medium,
+                    hit,
+                    face,
+                    not entering,
+                )
+                height += 1
+            else:
+                cut += strength
+        onward = mul(weight, at.transmitted)
+        strength = max(onward[0], onward[1], onward[2])
+        if strength > 0.0:
+            if segments + at.crossed <= limits.max_depth and strength >= limits.min_weight:
+                _push(
+                    waiting,
+                    height,
+                    at.p_t,
+                    at.wt,
+                    onward,
+                    segments + at.crossed,
+                    at.beyond,
+                    hit,
+                    face,
+                    entering,
+                )
+                height += 1
+            else:
+                cut += strength
+    return seen, cut
+
+
+@compiled
+def _render_rows(
+    scene: Arrays,
+    limits: Limits,
+    lobes: Lobes,
+    camera: Floats,
+    begin: int,
+    end: int,
+    pixels: Floats,
+    cut: Floats,
+) -> None:
+    height, width = cut.shape
+    depth = limits.max_depth + 1
+    waiting = Waiting(np.empty((depth, 9)), np.empty((depth, 5), np.int64))
+    stack = new_stack()
+    for j in range(begin, end):
+        for i in range(width):
+            x, y = pixel_centre(i, j, width, height)
+            o, d = primary_ray(camera, x, y)
+            seen, lost = radiance(scene, limits, lobes, o, d, waiting, stack)
+            for k in range(3):
+                pixels[j, i, k] = seen[k]
+            cut[j, i] = lost
+
+
+def render(scene: Scene, width: int, height: int, threads: int | None = None) -> Render:
+    """The image that the scene's camera sees through its pixels' centres.
+
+    Raises SceneError for a scene that cannot be traced. The same bits for any number of threads.
+    """
+    arrays = flatten(scene)
+    transport = scene.transport
+    limits = Limits(transport.max_depth, transport.min_weight)
+    lobes = Lobes(transport.reflection, transport.transmission, transport.radiance_n2)
+    camera = camera_row(scene.camera, width, height)
+    image = Render(np.empty((height, width, 3)), np.empty((height, width)))
+
+    def rows(begin: int, end: int) -> None:
+        _render_rows(arrays, limits, lobes, camera, begin, end, image.pixels, image.cut)
+
+    for_bands(rows, height, BAND, threads)
+    return image

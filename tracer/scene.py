@@ -1,0 +1,125 @@
+"""What a scene is made of, in words; `arrays.flatten` turns it into numbers for the kernels."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from tracer.camera import Orthographic, Perspective
+from tracer.errors import SceneError
+from tracer.mesh import Mesh
+from tracer.patterns import Pattern
+from tracer.shapes import Cell, Disk, Rectangle, Sphere
+from tracer.vector import Vec
+
+Shape = Sphere | Cell | Mesh | Rectangle | Disk
+
+
+@dataclass(frozen=True)
+class Medium:
+    """`ior` is the absolute index; light decays as ``exp(-absorption * length)`` per colour."""
+
+    ior: float
+    absorption: Vec = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.ior < math.inf):
+            raise SceneError(f"an index of refraction must be positive, not {self.ior}")
+        if not all(0.0 <= a < math.inf for a in self.absorption):
+            raise SceneError(f"absorption must be at least 0 and finite, not {self.absorption}")
+
+
+VACUUM = Medium(1.0)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed shape filled with `medium`, lying wholly inside `exterior`."""
+
+    shape: Sphere | Cell | Mesh
+    medium: Medium
+    exterior: Medium = VACUUM
+    name: str = "solid"
+
+
+@dataclass(frozen=True)
+class Emissive:
+    """Emits the pattern's radiance in all directions and reflects nothing."""
+
+    pattern: Pattern
+
+
+@dataclass(frozen=True)
+class Diffuse:
+    """Lambertian, lit by point lights: L = reflectance / pi * I cos(theta) / r^2."""
+
+    reflectance: Vec
+
+
+@dataclass(frozen=True)
+class Mirror:
+    reflectance: Vec = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Translucent:
+    """The lecture's translucence: ``filter * color + transmit`` passes straight through, and
+    ``(1 - filter - transmit) * color`` remains as a Lambertian reflectance.
+    """
+
+    color: Vec
+    filter: float
+    transmit: float
+
+
+@dataclass(frozen=True)
+class ThinSlab:
+    """The lecture's thin face: shifts the ray as a slab behind it would, keeps its direction."""
+
+    medium: Medium
+    thickness: float
+    exterior: Medium = VACUUM
+
+
+Material = Emissive | Diffuse | Mirror | Translucent | ThinSlab
+
+
+@dataclass(frozen=True)
+class Surface:
+    shape: Shape
+    material: Material
+    name: str = "surface"
+
+
+@dataclass(frozen=True)
+class PointLight:
+    position: Vec
+    intensity: Vec  # radiant intensity
+
+
+@dataclass(frozen=True)
+class Transport:
+    """How far light is followed.
+
+    `max_depth` counts path segments, camera to first surface is 1; rays that carry less than
+    `min_weight` are cut. The lobes of dielectrics can be switched off; total internal reflection
+    cannot. `radiance_n2` scales radiance with the square of the index, as it does in nature; the
+    factor cancels where camera and emitter are in media of the same index.
+    """
+
+    max_depth: int = 40
+    min_weight: float = 1e-6
+    reflection: bool = True
+    transmission: bool = True
+    radiance_n2: bool = False
+
+
+@dataclass(frozen=True)
+class Scene:
+    camera: Perspective | Orthographic
+    solids: tuple[Solid, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
+    lights: tuple[PointLight, ...] = ()
+    background: Vec = (0.0, 0.0, 0.0)
+    around_camera: Medium = VACUUM
+    transport: Transport = field(default_factory=Transport)
