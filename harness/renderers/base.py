@@ -124,8 +124,11 @@ class Health:
 class Renderer(Protocol):
     """The one seam between harness and renderers."""
 
-    name: str
-    capabilities: frozenset[Capability]
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def capabilities(self) -> frozenset[Capability]: ...
 
     def version(self) -> str:
         """Version of the renderer. Raises RendererMissing where it is not installed."""

@@ -1,0 +1,30 @@
+"""The images that renderers deliver in files: the right size, and no pixel that is no number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from harness import imagefile
+from harness.errors import InputError, RendererFailed
+from harness.imagefile import Encoding, Info, Pixels
+from harness.scene.resolved import Film
+
+
+def delivered(
+    path: Path, film: Film, *, log: str, encoding: Encoding | None = None
+) -> tuple[Pixels, Info]:
+    """The image at `path`. Raises RendererFailed, carrying `log`, where it is not what `film` asks.
+
+    A single NaN or infinity fails the image: no later stage could give it a meaning.
+    """
+    if not path.exists():
+        raise RendererFailed("wrote no image", log=log)
+    try:
+        pixels, info = imagefile.read(path, encoding=encoding, size=(film.width, film.height))
+    except InputError as error:
+        problem = error.problems[0]
+        text = str(problem).removeprefix(f"{problem.file}: ")  # a temporary name tells nobody
+        raise RendererFailed(f"wrote an unusable image: {text}", log=log) from error
+    if info.nonfinite:
+        raise RendererFailed(f"wrote NaN or infinity in {info.nonfinite} pixels", log=log)
+    return pixels, info
