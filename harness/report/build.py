@@ -1,0 +1,226 @@
+"""Writes the pages: `index.html` and `cases/<id>.html`, from a run's records alone.
+
+Records are read one at a time, so memory does not grow with curves and logs of all cases. What is
+unreadable or missing is shown as such: the report of a broken run is the one that is needed most.
+"""
+
+from __future__ import annotations
+
+import importlib.resources
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harness import record as records
+from harness.errors import InputError
+from harness.record import CaseRecord, Summary, SummaryCase, Verdict
+from harness.report import chart, mathml, overview, quantity, view
+from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
+from harness.report.links import RunFolder, clean, page_name, url
+
+if TYPE_CHECKING:
+    import jinja2
+
+PACKAGE = "harness.report"
+ASSETS = ("report.css", "report.js")
+COARSE = 180  # pictures narrower than this are shown enlarged, so let their pixels be seen
+GENERATOR = '<meta name="generator" content="snellcheck'
+
+
+def write_report(run_folder: Path) -> Path:
+    """Builds the report of the run in `run_folder`. Returns the path of its index page.
+
+    Reads `summary.json` and `records/*.json`. Raises InputError where the summary is missing or
+    unreadable; a case whose record is, is listed with the reason.
+    """
+    summary = records.read_summary(run_folder / "summary.json")
+    report = _Report(run_folder, summary)
+    for name in ASSETS:
+        text = importlib.resources.files(PACKAGE).joinpath("assets", name).read_text("utf-8")
+        records.write_text(run_folder / "assets" / name, text)
+    rows = report.write_cases()
+    _remove_stale(run_folder / "cases", {page_name(case.id) for case in summary.cases})
+    index = run_folder / "index.html"
+    records.write_text(index, report.index(rows))
+    return index
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """The pages before and after a case's in the order of the index."""
+
+    previous: tuple[str, str] | None  # (link, name)
+    following: tuple[str, str] | None
+    position: int
+    total: int
+
+
+class _Report:
+    """What all pages of one run share."""
+
+    def __init__(self, run_folder: Path, summary: Summary) -> None:
+        self.folder = run_folder
+        self.summary = summary
+        self.order = view.case_order(summary)
+        self.renderers = view.renderer_names(summary)
+        self.colours = colour_classes(self.renderers)
+        self.stray: list[str] = []  # record files that belong to no case of the summary
+        self.environment = _environment()
+        self.environment.globals.update(
+            colours=self.colours,
+            summary=summary,
+            generator=f"snellcheck {summary.snellcheck_version}",
+            scale=SCALE_HEX,
+            beyond="#{:02x}{:02x}{:02x}".format(*BEYOND),
+            not_finite="#{:02x}{:02x}{:02x}".format(*NOT_FINITE),
+        )
+
+    def write_cases(self) -> list[view.Row]:
+        """Writes a page per record, and returns the index's rows in their order."""
+        cases = {case.id: case for case in self.order}
+        rows: dict[str, view.Row] = {}
+        problems: list[str] = []
+        for path in sorted((self.folder / "records").glob("*.json")):
+            try:
+                record = records.read_case(path)
+            except InputError as error:
+                problems.append(f"{path.name}: {error.problems[0].message}")
+                continue
+            case = cases.get(record.id)
+            if case is None:
+                self.stray.append(path.name)
+                continue
+            records.write_text(self._page_path(case), self.case(record, path))
+            rows[case.id] = self._row(case, record, "")
+        missing = "no readable record of this case"
+        if problems:
+            missing += " (unreadable: " + "; ".join(problems[:3]) + ")"
+        for case in self.order:
+            if case.id not in rows:
+                self._page_path(case).unlink(missing_ok=True)
+                rows[case.id] = self._row(case, None, missing)
+        return [rows[case.id] for case in self.order]
+
+    def _page_path(self, case: SummaryCase) -> Path:
+        return self.folder / "cases" / page_name(case.id)
+
+    def _row(self, case: SummaryCase, record: CaseRecord | None, note: str) -> view.Row:
+        page = f"cases/{url(page_name(case.id))}" if record else None
+        folder = RunFolder(self.folder)
+        return view.row(
+            case, record, self.renderers, self.colours, folder, page=page, note=clean(note)
+        )
+
+    def case(self, record: CaseRecord, path: Path) -> str:
+        folder = RunFolder(self.folder, up="../")
+        runs = [
+            (
+                run,
+                view.renderer_verdict(run.name, record.checks, run),
+                [view.picture(image, folder) for image in run.images],
+            )
+            for run in record.runs
+        ]
+        charts = [chart.draw(curve, self.colours) for curve in record.curves]
+        name, parameters = view.split_id(record.id)
+        return self.environment.get_template("case.html.j2").render(
+            record=record,
+            name=name,
+            id_parameters=parameters,
+            headings=_parameters(record),
+            formula=mathml.typeset(record.formula),
+            checks=view.sorted_views(record.checks),
+            runs=runs,
+            pictured=any(images for _, _, images in runs),
+            coarse=all(i.width < COARSE for run in record.runs for i in run.images),
+            differences=view.differences(record, folder),
+            charts=charts,
+            record_href=folder.href(f"records/{path.name}"),
+            files=_files(record, folder),
+            neighbours=self._neighbours(record.id),
+        )
+
+    def _neighbours(self, case_id: str) -> Neighbours:
+        ids = [case.id for case in self.order]
+        at = ids.index(case_id)
+
+        def link(k: int) -> tuple[str, str] | None:
+            return (url(page_name(ids[k])), clean(ids[k])) if 0 <= k < len(ids) else None
+
+        return Neighbours(link(at - 1), link(at + 1), at + 1, len(ids))
+
+    def index(self, rows: list[view.Row]) -> str:
+        families = sorted({row.family for row in rows})
+        statuses = [v.value for v in records.SEVERITY if any(row.status == v for row in rows)]
+        verdict = overview.headline(self.summary)
+        return self.environment.get_template("index.html.j2").render(
+            headline=verdict,
+            tally=overview.tally(self.summary),
+            started=overview.started(self.summary),
+            lines=overview.renderer_lines(self.summary, self.renderers, rows),
+            absent={name for name, known in self.summary.renderers.items() if known.status != "ok"},
+            rows=rows,
+            families=families,
+            statuses=statuses,
+            renderers=self.renderers,
+            exit_meaning=overview.EXIT_CODES.get(self.summary.exit_code, "unknown"),
+            stray=self.stray,
+            verdicts=[verdict.value for verdict in Verdict],
+            worst_page=_page_of(rows, verdict.worst_case),
+        )
+
+
+def _page_of(rows: list[view.Row], case_id: str) -> str | None:
+    return next((row.page for row in rows if row.id == clean(case_id)), None)
+
+
+def _parameters(record: CaseRecord) -> list[tuple[str, str]]:
+    return [
+        (clean(key), clean(value) if isinstance(value, str) else quantity.number(value, digits=6))
+        for key, value in record.parameters.items()
+    ]
+
+
+def _files(record: CaseRecord, folder: RunFolder) -> list[tuple[str, str]]:
+    """Links to the files that are there, those of the case before those of its renderers."""
+    named = list(record.files.items())
+    named += [
+        (f"{run.name}: {key}", path) for run in record.runs for key, path in run.files.items()
+    ]
+    found = ((clean(name), folder.href(path)) for name, path in named)
+    return [(name, href) for name, href in found if href]
+
+
+def _remove_stale(folder: Path, wanted: set[str]) -> None:
+    """Removes pages of ours whose case is no longer part of the run; nothing else."""
+    for path in _pages(folder):
+        if path.name not in wanted:
+            path.unlink()
+
+
+def _pages(folder: Path) -> Iterator[Path]:
+    for path in folder.glob("*.html"):
+        with path.open(encoding="utf-8", errors="replace") as file:
+            if GENERATOR in file.read(2000):
+                yield path
+
+
+def _environment() -> jinja2.Environment:
+    import jinja2  # here, because the command line imports this module's package
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(PACKAGE),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters.update(
+        clean=clean,
+        number=quantity.number,
+        seconds=quantity.seconds,
+        count=quantity.count,
+        check=view.check_view,
+    )
+    return environment

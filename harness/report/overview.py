@@ -1,0 +1,192 @@
+"""The run as a whole: its verdict in a sentence, its counts, and a line for each renderer."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+from harness.record import Summary, Verdict
+from harness.report.links import clean
+from harness.report.quantity import count, number
+from harness.report.view import CheckView, Row, check_view
+
+EXIT_CODES = {
+    0: "all passed",
+    1: "a check failed",
+    2: "bad usage or bad input",
+    3: "something asked for could not run",
+}
+
+
+@dataclass(frozen=True)
+class Headline:
+    """The run in one sentence. `state` is a verdict's name, for its colour and icon."""
+
+    state: str
+    text: str
+    worst: CheckView | None
+    worst_case: str
+    also: list[str]
+
+
+def headline(summary: Summary) -> Headline:
+    counts = dict.fromkeys(Verdict, 0)
+    views: list[tuple[tuple[int, float], str, CheckView]] = []
+    for case in summary.cases:
+        for check in case.checks:
+            counts[check.status] += 1
+            if check.status in (Verdict.FAIL, Verdict.ERROR):
+                view = check_view(check)
+                # A wrong number is better news to open with than a missing one.
+                views.append(((check.status != Verdict.FAIL, view.rank[1]), case.id, view))
+    total = sum(counts.values())
+    also = _also(summary, counts)
+    if not total:
+        return Headline("error", "No checks were made", None, "", [*also, _NOTHING])
+    fail, error, skip = counts[Verdict.FAIL], counts[Verdict.ERROR], counts[Verdict.SKIP]
+    if fail or error:
+        _, case_id, view = min(views, key=lambda item: item[0])
+        verb = "fails" if fail == 1 else "fail"
+        text = (
+            f"{fail} of {count(total, 'check')} {verb}"
+            if fail
+            else f"{error} of {count(total, 'check')} ended in an error"
+        )
+        return Headline("fail" if fail else "error", text, view, case_id, also)
+    if skip:
+        return Headline("skip", f"No check fails; {skip} of {total} were skipped", None, "", also)
+    if summary.exit_code:
+        return Headline("error", f"{count(total, 'check')} passed, but not all ran", None, "", also)
+    return Headline("pass", f"All {count(total, 'check')} pass", None, "", also)
+
+
+_NOTHING = "A run without checks shows nothing, so it does not pass."
+
+
+def _also(summary: Summary, counts: dict[Verdict, int]) -> list[str]:
+    notes = []
+    if counts[Verdict.FAIL] and counts[Verdict.ERROR]:
+        notes.append(f"{counts[Verdict.ERROR]} more ended in an error")
+    if counts[Verdict.SKIP] and (counts[Verdict.FAIL] or counts[Verdict.ERROR]):
+        notes.append(f"{counts[Verdict.SKIP]} skipped")
+    if counts[Verdict.KNOWN]:
+        notes.append(
+            f"{count(counts[Verdict.KNOWN], 'known deviation')} at the size the scenes document"
+        )
+    stated = summary.counts.model_dump(by_alias=True)
+    if any(stated[verdict.value] != n for verdict, n in counts.items()):
+        notes.append("summary.json states other counts than its cases show")
+    return notes
+
+
+# --- counts ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Checks by verdict; `shares` are (verdict, start, width) in thousandths of all, bad first."""
+
+    total: Mapping[str, int]
+    shares: list[tuple[str, float, float]]
+
+
+BAR_ORDER = (Verdict.FAIL, Verdict.ERROR, Verdict.SKIP, Verdict.KNOWN, Verdict.PASS)
+
+
+def tally(summary: Summary) -> Tally:
+    counts = Counter(check.status for case in summary.cases for check in case.checks)
+    everything = sum(counts.values())
+    shares, start = [], 0.0
+    for verdict in BAR_ORDER:
+        if counts[verdict]:
+            width = 1000 * counts[verdict] / everything
+            shares.append((verdict.value, round(start, 2), round(width, 2)))
+            start += width
+    return Tally({verdict.value: counts[verdict] for verdict in Verdict}, shares)
+
+
+def started(summary: Summary) -> str:
+    """The start in UTC as people write it; what is no date is shown as it is."""
+    try:
+        moment = datetime.fromisoformat(summary.started)
+    except ValueError:
+        return clean(summary.started)
+    zone = moment.strftime("%Z") or "UTC"
+    return f"{moment:%Y-%m-%d %H:%M:%S} {zone}"
+
+
+# --- renderers ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A case in a renderer's strip; what is wrong stands taller, so that colour is not needed."""
+
+    status: Verdict | None
+    height: int
+    title: str
+    page: str | None
+
+
+HEIGHTS = {
+    Verdict.PASS: 5,
+    Verdict.KNOWN: 8,
+    Verdict.SKIP: 2,
+    Verdict.FAIL: 18,
+    Verdict.ERROR: 18,
+    None: 1,
+}
+
+
+@dataclass(frozen=True)
+class RendererLine:
+    name: str
+    version: str
+    ok: bool
+    state: str
+    reason: str
+    remedy: str
+    facts: list[tuple[str, str]]
+    strip: list[Mark]
+    tally: str
+    checks: int
+    passed: int
+    render_s: float
+
+
+def renderer_lines(
+    summary: Summary, names: Sequence[str], rows: Sequence[Row]
+) -> list[RendererLine]:
+    return [_line(name, column, summary, rows) for column, name in enumerate(names)]
+
+
+def _line(name: str, column: int, summary: Summary, rows: Sequence[Row]) -> RendererLine:
+    known = summary.renderers.get(name)
+    checks = [c for case in summary.cases for c in case.checks if c.renderer == name]
+    verdicts = Counter(check.status for check in checks)
+    facts = known.facts if known else {}
+    return RendererLine(
+        name=name,
+        version=clean(known.version) if known else "",
+        ok=known is not None and known.status == "ok",
+        state=clean(known.status) if known else "not in summary",
+        reason=clean(known.reason) if known else "",
+        remedy=clean(known.remedy) if known else "",
+        facts=[
+            (clean(key), clean(value) if isinstance(value, str) else number(value))
+            for key, value in facts.items()
+        ],
+        strip=[_mark(row, column) for row in rows],
+        tally=", ".join(f"{n} {verdict.value}" for verdict, n in verdicts.items()),
+        checks=len(checks),
+        passed=verdicts[Verdict.PASS] + verdicts[Verdict.KNOWN],
+        render_s=known.render_s if known else 0.0,
+    )
+
+
+def _mark(row: Row, column: int) -> Mark:
+    status = row.cells[column].status
+    word = status.value if status else "took no part"
+    return Mark(status, HEIGHTS[status], f"{row.id}: {word}", row.page)

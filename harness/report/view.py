@@ -1,0 +1,298 @@
+"""What pages show, as plain values: sorted, worded, with links that exist. Templates only place it.
+
+Nothing is judged here. Verdicts come from the records; `share` (error over tolerance) only orders
+failures and draws the bars.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from markupsafe import Markup
+
+from harness.record import (
+    SEVERITY,
+    CaseRecord,
+    Check,
+    DifferenceMap,
+    ImageFile,
+    RendererRun,
+    Summary,
+    SummaryCase,
+    Verdict,
+    worst,
+)
+from harness.report.chart import sparkline
+from harness.report.links import RunFolder, clean
+from harness.report.quantity import number, share, with_unit
+
+BROWSER_TYPES = (".png", ".webp", ".jpg", ".jpeg", ".gif", ".avif", ".svg")
+
+
+# --- checks ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CheckView:
+    check: Check
+    ratio: float | None  # error over tolerance; None where nothing was measured
+    value: str
+    expected: str
+    tolerance: str
+    limit: str  # expected and tolerance together, as short as can be
+    error: str
+    used: str
+    bar: float  # 0 … 1, for drawing
+
+    @property
+    def over(self) -> bool:
+        return self.ratio is not None and not self.ratio <= 1
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """Sorts worst first."""
+        ratio = -1.0 if self.ratio is None else self.ratio
+        return SEVERITY.index(self.check.status), -(math.inf if math.isnan(ratio) else ratio)
+
+
+def check_view(check: Check) -> CheckView:
+    value, expected, tolerance = check.value, check.expected, check.tolerance
+    unit = clean(check.unit)
+    resolution = tolerance if expected else None
+    error = ratio = None
+    if value is not None and expected is not None:
+        error = value - expected
+        if tolerance is not None:
+            ratio = _ratio(abs(error), tolerance)
+    tolerance_text = with_unit(number(tolerance, digits=3), unit)
+    limit = ""
+    if tolerance is not None:
+        plain = number(expected, resolution)
+        limit = f"≤ {tolerance_text}" if not expected else f"{plain} ± {tolerance_text}"
+    return CheckView(
+        check=check,
+        ratio=ratio,
+        value=with_unit(number(value, resolution), unit),
+        expected=with_unit(number(expected, resolution), unit),
+        tolerance=tolerance_text,
+        limit=limit,
+        error=with_unit(number(error, digits=3), unit) if expected else "",
+        used=share(ratio),
+        bar=0.0 if ratio is None else 1.0 if math.isnan(ratio) else min(1.0, ratio),
+    )
+
+
+def _ratio(error: float, tolerance: float) -> float:
+    if tolerance > 0:
+        return error / tolerance
+    return 0.0 if error == 0 else math.nan if math.isnan(error) else math.inf
+
+
+def sorted_views(checks: Iterable[Check]) -> list[CheckView]:
+    """Worst first; the order of the record among equals."""
+    return sorted((check_view(check) for check in checks), key=lambda view: view.rank)
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What to show of an image. `shown` is None where the picture is absent."""
+
+    shown: str | None
+    full: str | None
+    data: str | None  # the linear data, where it is no picture itself
+    role: str
+    size: str
+
+
+def picture(image: ImageFile, folder: RunFolder) -> Picture:
+    data = folder.href(image.path)
+    viewable = data if image.path.lower().endswith(BROWSER_TYPES) else None
+    full = folder.href(image.picture) or viewable or folder.href(image.thumbnail)
+    return Picture(
+        shown=folder.href(image.thumbnail) or full,
+        full=full,
+        data=data if data != full else None,
+        role=clean(image.role),
+        size=f"{image.width} × {image.height}",
+    )
+
+
+def main_picture(images: Sequence[ImageFile], folder: RunFolder) -> Picture | None:
+    """The image proper before any probe."""
+    ordered = sorted(images, key=lambda image: image.role != "image")
+    return picture(ordered[0], folder) if ordered else None
+
+
+@dataclass(frozen=True)
+class DifferenceView:
+    a: str
+    b: str
+    href: str | None
+    figures: list[CheckView]  # the checks that compare just these two
+
+
+@dataclass(frozen=True)
+class DifferenceGroup:
+    """Maps that share one scale, and so one colour bar."""
+
+    limit: str
+    half: str
+    maps: list[DifferenceView]
+
+
+def differences(record: CaseRecord, folder: RunFolder) -> list[DifferenceGroup]:
+    groups: dict[tuple[float, str], list[DifferenceMap]] = {}
+    for item in record.differences:
+        groups.setdefault((item.limit, item.unit), []).append(item)
+    return [
+        DifferenceGroup(
+            limit=with_unit(number(limit, digits=3), clean(unit)),
+            half=with_unit(number(limit / 2, digits=3), clean(unit)),
+            maps=[_difference(item, record.checks, folder) for item in items],
+        )
+        for (limit, unit), items in groups.items()
+    ]
+
+
+def _difference(item: DifferenceMap, checks: Iterable[Check], folder: RunFolder) -> DifferenceView:
+    pair = {item.a, item.b}
+    between = [check for check in checks if {check.renderer, check.against} == pair]
+    return DifferenceView(item.a, item.b, folder.href(item.path), sorted_views(between))
+
+
+# --- index ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One case with one renderer. `status` is None where the renderer had no part in it."""
+
+    renderer: str
+    status: Verdict | None
+    main: CheckView | None
+    checks: int
+    bad: int
+    reason: str
+    picture: Picture | None
+    spark: Markup | None  # the residuals of the first curve, where there is no picture
+
+
+@dataclass(frozen=True)
+class Row:
+    id: str
+    name: str
+    parameters: list[tuple[str, str]]
+    family: str
+    title: str
+    status: Verdict
+    note: str  # why there is no page or no record
+    page: str | None
+    cells: list[Cell]
+
+
+def split_id(case_id: str) -> tuple[str, list[tuple[str, str]]]:
+    """The name and the parameters of an id such as "slab-offset[n=1.5,t=1]"."""
+    name, bracket, rest = clean(case_id).partition("[")
+    if not bracket or not rest.endswith("]"):
+        return clean(case_id), []
+    pairs = [part.partition("=") for part in rest[:-1].split(",")]
+    return name, [(key, value) for key, _, value in pairs]
+
+
+def row(
+    case: SummaryCase,
+    record: CaseRecord | None,
+    renderers: Sequence[str],
+    colours: Mapping[str, str],
+    folder: RunFolder,
+    *,
+    page: str | None,
+    note: str,
+) -> Row:
+    runs = {run.name: run for run in record.runs} if record else {}
+    curve = record.curves[0] if record and record.curves else None
+    name, parameters = split_id(case.id)
+    return Row(
+        id=clean(case.id),
+        name=name,
+        parameters=parameters,
+        family=clean(case.family),
+        title=clean(record.title) if record else "",
+        status=case.status,
+        note=note,
+        page=page,
+        cells=[
+            _cell(
+                renderer,
+                case.checks,
+                runs.get(renderer),
+                folder,
+                spark=sparkline(curve, renderer, colours) if curve else None,
+            )
+            for renderer in renderers
+        ],
+    )
+
+
+def _cell(
+    renderer: str,
+    checks: Iterable[Check],
+    run: RendererRun | None,
+    folder: RunFolder,
+    *,
+    spark: Markup | None,
+) -> Cell:
+    views = sorted_views(check for check in checks if check.renderer == renderer)
+    shown = main_picture(run.images, folder) if run else None
+    status = renderer_verdict(renderer, (view.check for view in views), run)
+    reason = clean(run.reason) if run and run.status != Verdict.PASS else ""
+    main = views[0] if views else None
+    if not reason and main and main.check.value is None:
+        reason = clean(main.check.reason)
+    return Cell(
+        renderer=renderer,
+        status=status,
+        main=main,
+        checks=len(views),
+        bad=sum(view.check.status in (Verdict.FAIL, Verdict.ERROR) for view in views),
+        reason=reason,
+        picture=shown,
+        spark=None if shown else spark,
+    )
+
+
+def renderer_verdict(
+    renderer: str, checks: Iterable[Check], run: RendererRun | None
+) -> Verdict | None:
+    """Of a renderer in one case: its run's and its checks' worst; None where it had no part."""
+    verdicts = [check.status for check in checks if check.renderer == renderer]
+    if run:
+        verdicts.append(run.status)
+    return worst(verdicts) if verdicts else None
+
+
+def case_order(summary: Summary) -> list[SummaryCase]:
+    """Failures first, worst first; otherwise as the run had them."""
+
+    def rank(case: SummaryCase) -> tuple[int, float]:
+        views = [check_view(check).rank for check in case.checks]
+        return SEVERITY.index(case.status), min(views, default=(0, 0.0))[1]
+
+    bad = (Verdict.ERROR, Verdict.FAIL)
+    return sorted(
+        summary.cases,
+        key=lambda c: rank(c) if c.status in bad else (SEVERITY.index(c.status), 0.0),
+    )
+
+
+def renderer_names(summary: Summary) -> list[str]:
+    """Those the run knew, then any that only checks name."""
+    names = list(summary.renderers)
+    for case in summary.cases:
+        names += [check.renderer for check in case.checks if check.renderer not in names]
+    return list(dict.fromkeys(names))
