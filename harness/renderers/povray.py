@@ -1,0 +1,235 @@
+"""POV-Ray as a renderer: one process per image, in a private folder, without a shell.
+
+Many processes at once are the way to be quick: most of the wall time of each is sleep.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness import imagefile
+from harness.errors import (
+    InputError,
+    RendererError,
+    RendererFailed,
+    RendererMissing,
+    RendererUnsupported,
+)
+from harness.renderers.base import Capability, Health, Image, RenderSettings
+from harness.renderers.process import Finished, run_limited
+from harness.scene import resolved as rs
+from harness.translate.povray import MAX_TRACE_LEVEL, PovScene, options, translate
+
+MACOS = sys.platform == "darwin"
+INSTALL = "brew install povray" if MACOS else "sudo apt-get install povray"
+REINSTALL = "brew reinstall povray" if MACOS else "sudo apt-get install --reinstall povray"
+OLDEST = (3, 7)
+GOODBYE = "POV-Ray finished"
+HEALTHY = (0.25, 0.5, 1.0)
+
+# POV-Ray's own confinement. It was seen not to hold, so it is not what safety rests on: that is
+# `translate.povray`, which lets numbers alone into the scene. Without this file POV-Ray complains.
+CONFIGURATION = """\
+[File I/O Security]
+restricted
+[Shellout Security]
+forbidden
+[Permitted Paths]
+read+write = .
+"""
+
+
+class PovRayRenderer:
+    """Implements `harness.renderers.base.Renderer` with the `povray` executable.
+
+    Not claimed: THIN_SLAB, RAYS, RADIANCE_N2. `settings.samples` and `.seed` play no part: one ray
+    goes through each pixel centre.
+    """
+
+    name = "povray"
+    capabilities = frozenset(
+        {
+            Capability.IMAGE,
+            Capability.PIXEL_CENTRES,
+            Capability.LOBE_SWITCH,
+            Capability.SPHERE,
+            Capability.CONVEX,
+            Capability.CYLINDER,
+            Capability.MESH,
+            Capability.SMOOTH_MESH,
+            Capability.MIRROR,
+            Capability.DIFFUSE,
+            Capability.TRANSLUCENT,
+            Capability.PICTURE,
+            Capability.ABSORPTION,
+            Capability.FRESNEL,
+            Capability.NESTED,
+            Capability.CAMERA_INSIDE,
+        }
+    )
+
+    def __init__(self, executable: str = "povray") -> None:
+        self._executable = executable
+        self._version: str | None = None
+
+    def version(self) -> str:
+        if self._version is None:
+            path = self._path()
+            with tempfile.TemporaryDirectory(prefix="snellcheck-povray-") as folder:
+                done = _run([path, "--version"], Path(folder), RenderSettings(timeout_s=30))
+            found = re.search(r"^POV-Ray (\d+)\.(\d+)\S*", done.stdout + done.stderr, re.MULTILINE)
+            if found is None:
+                raise RendererFailed(f"{path} does not tell its version", log=done.stderr)
+            if (int(found[1]), int(found[2])) < OLDEST:
+                raise RendererMissing(f"{found[0]} is too old: POV-Ray 3.7 is needed; {INSTALL}")
+            self._version = found[0].removeprefix("POV-Ray ")
+        return self._version
+
+    def render(self, scene: rs.ResolvedScene, settings: RenderSettings) -> Image:
+        path = self._path()
+        translated = translate(scene)
+        with tempfile.TemporaryDirectory(prefix="snellcheck-povray-") as name:
+            folder = Path(name)
+            _write(translated, scene, folder)
+            arguments = ["scene.ini", f"+WT{max(1, settings.threads):d}"]
+            done = _run([path, *arguments], folder, settings)
+            log = messages(done.stderr)
+            if done.returncode != 0:
+                raise RendererFailed(_reason(log, done.returncode), log=log)
+            pixels = _read_pixels(folder / "image.ppm", scene, log)
+            statistics = _read_text(folder / "statistics.txt")
+        _check_depth(scene, statistics)
+        return Image(
+            pixels=pixels / np.float32(translated.exposure),
+            seconds=_trace_seconds(statistics, done.wall_s),
+            log=log,
+            command=shlex.join([self._executable, *arguments]),
+        )
+
+    def health(self) -> Health:
+        try:
+            path, version = self._path(), self.version()
+            _check_health(self.render(_health_scene(), RenderSettings(timeout_s=30, threads=1)))
+        except RendererMissing as error:
+            return Health(self.name, usable=False, detail=str(error), remedy=INSTALL)
+        except RendererError as error:
+            detail = " ".join(filter(None, (str(error), error.log)))
+            return Health(self.name, usable=False, detail=detail, remedy=REINSTALL)
+        return Health(self.name, usable=True, version=version, path=path)
+
+    def emit(self, scene: rs.ResolvedScene, folder: Path) -> Path:
+        """Writes `scene.pov`, its pictures, and `scene.ini`: ``povray scene.ini`` renders them."""
+        folder.mkdir(parents=True, exist_ok=True)
+        return _write(translate(scene), scene, folder)
+
+    def _path(self) -> str:
+        path = shutil.which(self._executable)
+        if path is None:
+            raise RendererMissing(f"POV-Ray is not installed: {INSTALL}")
+        return path
+
+
+def _write(translated: PovScene, scene: rs.ResolvedScene, folder: Path) -> Path:
+    for name, content in translated.attachments.items():
+        (folder / name).write_bytes(content)
+    (folder / "scene.ini").write_text(options(scene), encoding="ascii")
+    main = folder / "scene.pov"
+    main.write_text(translated.sdl, encoding="ascii")
+    return main
+
+
+def _run(argv: list[str], folder: Path, settings: RenderSettings) -> Finished:
+    """Runs POV-Ray with a home of its own, so that no settings of the user or site count."""
+    home = folder / "home"
+    for series in ("3.7", "3.8"):
+        configuration = home / ".povray" / series / "povray.conf"
+        configuration.parent.mkdir(parents=True)
+        configuration.write_text(CONFIGURATION, encoding="ascii")
+    ini = home / "povray.ini"
+    ini.touch()
+    env = {**os.environ, "HOME": str(home), "POVINI": str(ini)}
+    return run_limited(
+        argv, cwd=folder, timeout_s=settings.timeout_s, memory_mb=settings.memory_mb, env=env
+    )
+
+
+def messages(stderr: str) -> str:
+    """What POV-Ray said of the scene, word for word: stderr without banner and progress."""
+    start, banner, rest = stderr.partition("Persistence of Vision(tm) Ray Tracer Version")
+    if banner:
+        # The banner ends where parsing begins, or with the stream, where it never began.
+        _, parsing, after = rest.partition("==== [Parsing...]")
+        rest = parsing + after if parsing else banner + rest
+    lines = (start + rest).splitlines()
+    said = [s for s in lines if s.strip() and not s.startswith("==== [") and s != GOODBYE]
+    return "\n".join(said)
+
+
+def _reason(log: str, returncode: int) -> str:
+    """The first error in the log, which goes on over indented lines."""
+    found = re.search(r"^.*\b(?:Error|error)\b.*(?:\n .*)*", log, re.MULTILINE)
+    said = " ".join(found[0].split()) if found else f"exit status {returncode}"
+    return f"POV-Ray did not render the scene: {said}"
+
+
+def _read_pixels(path: Path, scene: rs.ResolvedScene, log: str) -> NDArray[np.float32]:
+    size = scene.film.width, scene.film.height
+    try:
+        pixels, info = imagefile.read(path, encoding="linear", size=size)
+    except InputError as error:
+        message = error.problems[0].message
+        raise RendererFailed(f"POV-Ray's image: {message}", log=log) from error
+    if info.bits != 16:
+        raise RendererFailed(f"POV-Ray wrote {info.bits} bits instead of 16", log=log)
+    return pixels
+
+
+def _read_text(path: Path) -> str:
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
+def _trace_seconds(statistics: str, wall_s: float) -> float:
+    """POV-Ray's own time of tracing; the wall time of the process where it does not tell."""
+    found = re.search(r"Trace Time:.*\((\d+\.\d+) seconds\)", statistics)
+    return float(found[1]) if found else wall_s
+
+
+def _check_depth(scene: rs.ResolvedScene, statistics: str) -> None:
+    """POV-Ray cannot go deeper than 256: a scene that would is not rendered as asked."""
+    found = re.search(r"Max Level:\s*(\d+)/", statistics)
+    if scene.transport.max_depth > MAX_TRACE_LEVEL and found and int(found[1]) >= MAX_TRACE_LEVEL:
+        raise RendererUnsupported(
+            f"light takes more than POV-Ray's {MAX_TRACE_LEVEL} segments; "
+            f"max_depth asks for {scene.transport.max_depth}"
+        )
+
+
+# --- health -------------------------------------------------------------------------------------
+
+
+def _health_scene() -> rs.ResolvedScene:
+    """8 x 8 pixels of an even glow."""
+    return rs.ResolvedScene(
+        film=rs.Film(width=8, height=8),
+        camera=rs.Orthographic(
+            origin=(0, 0, 1), right=(1, 0, 0), up=(0, 1, 0), forward=(0, 0, -1), width=1
+        ),
+        media=(rs.Medium(name="air", ior=1.0),),
+        background=HEALTHY,
+        transport=rs.Transport(max_depth=1, min_weight=0),
+    )
+
+
+def _check_health(image: Image) -> None:
+    # Half a step of 16 bits, and single precision.
+    if not np.allclose(image.pixels, np.array(HEALTHY), rtol=0, atol=1e-5):
+        raise RendererFailed(f"an even glow of {HEALTHY} came out as {image.pixels[0, 0]}")
