@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import os
 import platform
 import shlex
 import sys
@@ -20,7 +19,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import harness
+from harness.cores import core_count
 from harness.data import cache_root, scenes_root
+from harness.errors import SnellcheckError
 from harness.renderers.base import Health, Renderer
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def diagnose(factories: Mapping[str, Factory] | None = None) -> Diagnosis:
         snellcheck=harness.__version__,
         python=platform.python_version(),
         system=f"{platform.system()} {platform.release()} {platform.machine()}",
-        cores=usable_cores(),
+        cores=core_count(),
         memory_mb=memory.total // 2**20,
         memory_available_mb=memory.available // 2**20,
         cache=str(cache_root()),
@@ -95,22 +96,16 @@ def diagnose(factories: Mapping[str, Factory] | None = None) -> Diagnosis:
     )
 
 
-def usable_cores() -> int:
-    """Cores this process may run on, which a container or a CI machine may restrict."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 def _examine(name: str, factory: Factory) -> Health:
     """The health of one renderer; one that does not even load is unusable, not our end."""
     try:
         return factory().health()
-    except Exception as error:  # a third party's factory can raise anything
+    except Exception as error:  # a third party's code can raise anything
+        known = isinstance(error, SnellcheckError)
         return Health(
             name=name,
             usable=False,
-            detail=f"cannot be loaded: {type(error).__name__}: {error}",
+            detail=str(error) if known else f"{type(error).__name__}: {error}",
             remedy=f"mend or uninstall the package that registers the renderer {name!r}",
         )
 

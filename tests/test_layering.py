@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data"),
+    ("errors", "data", "cores"),
     ("record", "imagefile", "expected", "measure.observables"),
     ("scene",),
     ("renderers.base",),
@@ -32,9 +32,10 @@ LAYERS = (
     ("probe",),
     ("measure",),
     ("verdict", "preflight"),
-    ("plan", "results", "pairs", "judge", "run"),
-    ("report", "doctor"),
-    ("cli",),
+    ("report",),
+    ("plan", "results", "pairs", "judge", "archive", "lanes", "run"),
+    ("doctor",),
+    ("show", "cli"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 

@@ -158,7 +158,7 @@ def test_the_installed_renderers_register_themselves(installed: Installed) -> No
 
 def test_the_installed_suite_runs(installed: Installed) -> None:
     installed(
-        *("snellcheck", "run", "slab-offset[[]thickness=0.25,ior=1.5]"),
+        *("snellcheck", "run", "slab-offset[thickness=0.25,ior=1.5]"),
         *("--renderer", "tracer", "--quality", "draft", "--out", "report"),
     )
     report = installed.folder / "report"
