@@ -28,3 +28,12 @@ def delivered(
     if info.nonfinite:
         raise RendererFailed(f"wrote NaN or infinity in {info.nonfinite} pixels", log=log)
     return pixels, info
+
+
+def described(info: Info) -> str:
+    """What a reader of the log should know of the file; nothing where it holds floats."""
+    if info.encoding_from == "format":
+        return ""
+    how = {"declared": "as declared", "file": "as it says", "assumed": "assumed"}
+    encoding = f"{info.encoding} ({how[info.encoding_from]})"
+    return f"the image came as {info.format.upper()} of {info.bits} bits, {encoding}"

@@ -21,7 +21,7 @@ from harness.imagefile import Encoding
 from harness.renderers import wire
 from harness.renderers.base import Capability, Health, Image, RayPaths, Rays, RenderSettings
 from harness.renderers.child import Child
-from harness.renderers.delivery import delivered
+from harness.renderers.delivery import delivered, described
 from harness.renderers.needs import require
 from harness.renderers.proof import proof_scene, prove
 from harness.scene.resolved import ResolvedScene
@@ -107,11 +107,12 @@ class WorkerRenderer:
             output = folder / f"image.{self._program.image_format}"
             reply = self._ask("render", settings, scene=_write(scene, folder), output=output)
             encoding = self._program.encoding
-            pixels, _ = delivered(output, scene.film, log=reply.log, encoding=encoding)
+            pixels, info = delivered(output, scene.film, log=reply.log, encoding=encoding)
             variance = None
             if reply.variance is not None:
                 variance, _ = delivered(reply.variance, scene.film, log=reply.log)
-            return Image(pixels, variance, reply.seconds or 0.0, reply.log, reply.command)
+            log = "\n".join(filter(None, (reply.log, described(info))))
+            return Image(pixels, variance, reply.seconds or 0.0, log, reply.command)
 
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
@@ -158,7 +159,8 @@ class WorkerRenderer:
             version = greeting.version
             if "health" in greeting.operations:
                 found = probe._ask("health", RenderSettings())
-            prove(probe.render(proof_scene(), RenderSettings(samples=16)))
+            scene = proof_scene(probe.capabilities)
+            prove(probe.render(scene, RenderSettings(samples=16)))
         except RendererError as error:
             detail = " ".join([str(error), *error.log.splitlines()[-1:]])
             remedy = found.remedy or self._remedy

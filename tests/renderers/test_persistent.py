@@ -22,6 +22,7 @@ from harness.scene import resolved
 from tests.fakes import MISBEHAVE
 
 ALL = frozenset(Capability)
+SCENE = proof_scene(ALL)
 SEED_1 = RenderSettings(seed=100)
 
 
@@ -65,14 +66,14 @@ def test_is_a_renderer(make) -> None:
 
 def test_one_worker_serves_many_requests(make) -> None:
     renderer = make("Plain")
-    first, second = (renderer.render(proof_scene(), RenderSettings()) for _ in range(2))
+    first, second = (renderer.render(SCENE, RenderSettings()) for _ in range(2))
     assert first.pixels[0, 0, 0] == second.pixels[0, 0, 0] == pid(renderer) != os.getpid()
-    assert renderer.render(proof_scene(), SEED_1).pixels.tolist() == np.ones((8, 8, 3)).tolist()
+    assert renderer.render(SCENE, SEED_1).pixels.tolist() == np.ones((8, 8, 3)).tolist()
     assert first.seconds > 0
 
 
 def test_everything_that_an_image_says_arrives(make) -> None:
-    image = make("Full").render(proof_scene(), RenderSettings())
+    image = make("Full").render(SCENE, RenderSettings())
     assert image.pixels[3, 4].tolist() == [0.25, 0.5, 0.75]
     assert np.array_equal(image.variance, image.pixels / np.float32(100))
     assert (image.seconds, image.log, image.command) == (0.125, "fine", "full --go")
@@ -81,7 +82,7 @@ def test_everything_that_an_image_says_arrives(make) -> None:
 def test_rays_arrive_exactly(make) -> None:
     random = np.random.default_rng(1)
     rays = Rays(random.normal(size=(5, 3)), random.normal(size=(5, 3)))
-    paths = make("Full").trace(proof_scene(), rays, "TRT", RenderSettings())
+    paths = make("Full").trace(SCENE, rays, "TRT", RenderSettings())
     assert paths.status.tolist() == [0, 1, 1, 1, 1]
     assert paths.status.dtype == np.int8
     assert paths.surface.tolist() == [0, -1, -1, -1, -1]
@@ -97,32 +98,32 @@ def test_rays_arrive_exactly(make) -> None:
 def test_no_ray_api(make) -> None:
     rays = Rays(np.zeros((1, 3)), np.ones((1, 3)))
     with pytest.raises(RendererUnsupported, match="no ray API"):
-        make("Plain").trace(proof_scene(), rays, "", RenderSettings())
+        make("Plain").trace(SCENE, rays, "", RenderSettings())
 
 
 def test_prints_do_not_reach_the_protocol(make) -> None:
-    image = make("Chatty").render(proof_scene(), SEED_1)
+    image = make("Chatty").render(SCENE, SEED_1)
     assert image.pixels[0, 0, 0] == 1
     assert set(image.log.splitlines()) == {"from Python", "from C", "from a child"}
 
 
 def test_the_log_is_that_of_the_request(make) -> None:
     renderer = make("Chatty")
-    logs = [renderer.render(proof_scene(), SEED_1).log for _ in range(2)]
+    logs = [renderer.render(SCENE, SEED_1).log for _ in range(2)]
     assert logs[0].count("from C") == logs[1].count("from C") == 1
 
 
 def test_emit(make, tmp_path: Path) -> None:
-    assert make("Full").emit(proof_scene(), tmp_path / "a").read_text() == "8"
+    assert make("Full").emit(SCENE, tmp_path / "a").read_text() == "8"
     assert [p.name for p in (tmp_path / "a").iterdir()] == ["scene.txt"]
-    file = make("Plain").emit(proof_scene(), tmp_path / "b")
-    assert resolved.ResolvedScene.model_validate_json(file.read_bytes()) == proof_scene()
+    file = make("Plain").emit(SCENE, tmp_path / "b")
+    assert resolved.ResolvedScene.model_validate_json(file.read_bytes()) == SCENE
 
 
 def test_unsupported_scenes_are_not_sent(make) -> None:
     renderer = make("Plain", capabilities=frozenset({Capability.FRESNEL}))
     with pytest.raises(RendererUnsupported, match=r"does not claim sphere \(solid 'ball' is a sph"):
-        renderer.render(proof_scene(), RenderSettings())
+        renderer.render(SCENE, RenderSettings())
     assert renderer._child is None
 
 
@@ -145,7 +146,7 @@ def test_threads_wait_for_each_other(make) -> None:
     seen: dict[int, float] = {}
 
     def render(seed: int) -> None:
-        image = renderer.render(proof_scene(), RenderSettings(seed=seed))
+        image = renderer.render(SCENE, RenderSettings(seed=seed))
         seen[seed] = float(image.pixels[0, 0, 0])
 
     threads = [threading.Thread(target=render, args=(seed,)) for seed in range(1, 9)]
@@ -177,15 +178,15 @@ def test_a_fault_costs_one_request(
 ) -> None:
     renderer = make("Faulty")
     with pytest.raises(RendererFailed) as caught:
-        renderer.render(proof_scene(), RenderSettings(seed=seed, **limits))
+        renderer.render(SCENE, RenderSettings(seed=seed, **limits))
     assert message in str(caught.value)
     assert log in caught.value.log
-    assert renderer.render(proof_scene(), SEED_1).pixels[0, 0, 0] == 1
+    assert renderer.render(SCENE, SEED_1).pixels[0, 0, 0] == 1
 
 
 def test_unsupported_by_the_engine(make) -> None:
     with pytest.raises(RendererUnsupported, match="no prisms here"):
-        make("Faulty").render(proof_scene(), RenderSettings(seed=6))
+        make("Faulty").render(SCENE, RenderSettings(seed=6))
 
 
 def test_killed_between_requests(make) -> None:
@@ -193,7 +194,7 @@ def test_killed_between_requests(make) -> None:
     renderer.version()
     psutil.Process(pid(renderer)).kill()
     psutil.Process(pid(renderer)).wait(5)
-    assert renderer.render(proof_scene(), SEED_1).pixels[0, 0, 0] == 1
+    assert renderer.render(SCENE, SEED_1).pixels[0, 0, 0] == 1
 
 
 @pytest.mark.parametrize(
@@ -209,7 +210,7 @@ def test_engines_that_do_not_start(
     engine: str, kind: type[RendererError], message: str, make
 ) -> None:
     renderer = make(engine, remedy="do this")
-    for ask in (renderer.version, lambda: renderer.render(proof_scene(), RenderSettings())):
+    for ask in (renderer.version, lambda: renderer.render(SCENE, RenderSettings())):
         with pytest.raises(kind) as caught:
             ask()
         assert message in str(caught.value)
@@ -249,14 +250,14 @@ def test_outside_workers(mode: str, kind: type[RendererError], message: str, mak
     bystander.version()
     for _ in range(2):
         with pytest.raises(kind) as caught:
-            renderer.render(proof_scene(), RenderSettings(memory_mb=200, timeout_s=20))
+            renderer.render(SCENE, RenderSettings(memory_mb=200, timeout_s=20))
         assert message in str(caught.value)
     assert bystander._child.usable()
 
 
 def test_a_good_outside_worker_that_leaves_children(make) -> None:
     renderer = make(misbehave("fork"), capabilities=ALL)
-    assert renderer.render(proof_scene(), RenderSettings()).pixels[0, 0, 0] == 0.25
+    assert renderer.render(SCENE, RenderSettings()).pixels[0, 0, 0] == 0.25
     members = renderer._child._tree
     members._find_members()
     assert len(members._members) == 3
@@ -283,7 +284,7 @@ def test_close_ends_the_process_and_its_files(make) -> None:
     assert not process.is_running()
     assert not private.exists()
     assert renderer.version() == "1.2.3"  # cached
-    renderer.render(proof_scene(), SEED_1)  # starts another
+    renderer.render(SCENE, SEED_1)  # starts another
 
 
 def test_forgotten_renderers_end_their_workers() -> None:
@@ -295,7 +296,7 @@ def test_forgotten_renderers_end_their_workers() -> None:
 
 
 def _render_in_fork(renderer: WorkerRenderer, results: multiprocessing.Queue) -> None:
-    image = renderer.render(proof_scene(), RenderSettings())
+    image = renderer.render(SCENE, RenderSettings())
     results.put(int(image.pixels[0, 0, 0]))
     renderer.close()
 
@@ -303,7 +304,7 @@ def _render_in_fork(renderer: WorkerRenderer, results: multiprocessing.Queue) ->
 @pytest.mark.filterwarnings("ignore:This process.*is multi-threaded:DeprecationWarning")
 def test_a_fork_has_a_worker_of_its_own(make) -> None:
     renderer = make("Plain")
-    mine = int(renderer.render(proof_scene(), RenderSettings()).pixels[0, 0, 0])
+    mine = int(renderer.render(SCENE, RenderSettings()).pixels[0, 0, 0])
     context = multiprocessing.get_context("fork")
     results = context.Queue()
     fork = context.Process(target=_render_in_fork, args=(renderer, results))
@@ -311,7 +312,7 @@ def test_a_fork_has_a_worker_of_its_own(make) -> None:
     theirs = results.get(timeout=60)
     fork.join(60)
     assert theirs != mine
-    assert int(renderer.render(proof_scene(), RenderSettings()).pixels[0, 0, 0]) == mine
+    assert int(renderer.render(SCENE, RenderSettings()).pixels[0, 0, 0]) == mine
 
 
 def test_a_worker_does_not_outlive_a_killed_parent(tmp_path: Path) -> None:

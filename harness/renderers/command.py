@@ -1,0 +1,206 @@
+"""Any executable as a renderer: it is given scene.json and writes an image."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import shlex
+import shutil
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from harness.errors import InputError, RendererError, RendererFailed, RendererMissing, nearest
+from harness.imagefile import Encoding
+from harness.renderers.base import Capability, Health, Image, RenderSettings
+from harness.renderers.delivery import delivered, described
+from harness.renderers.needs import require
+from harness.renderers.process import run_limited, tail
+from harness.renderers.proof import proof_scene, prove
+from harness.scene.resolved import ResolvedScene
+
+ImageFormat = Literal["exr", "pfm", "npy", "png"]
+
+# What a renderer is taken to claim that does not say. RAYS needs the persistent protocol; the
+# others are rare, and wrongly assumed they would spoil measurements rather than fail them.
+USUAL_CLAIMS = frozenset(Capability) - {
+    Capability.RAYS,
+    Capability.LOBE_SWITCH,
+    Capability.THIN_SLAB,
+    Capability.RADIANCE_N2,
+}
+
+_PLACEHOLDER = re.compile(r"\{(\w+)\}")
+_PLACEHOLDERS = ("scene", "output", "width", "height", "samples", "seed", "threads", "python")
+
+
+@dataclass(frozen=True)
+class Template:
+    """A command line with placeholders, split as a shell would split it; there is no shell."""
+
+    words: tuple[str, ...]
+
+    @classmethod
+    def parse(
+        cls,
+        text: str,
+        *,
+        known: tuple[str, ...] = _PLACEHOLDERS,
+        needs: tuple[str, ...] = ("scene", "output"),
+    ) -> Template:
+        """Raises InputError where `text` is no command line or its placeholders are not right."""
+        try:
+            words = tuple(shlex.split(text))
+        except ValueError as error:
+            message = f"not a command line: {error}"
+            raise InputError.of(message, key="command", value=text) from error
+        if not words:
+            raise InputError.of("an empty command", key="command")
+        used = {name for word in words for name in _PLACEHOLDER.findall(word)}
+        for name in sorted(used - set(known)):
+            raise InputError.of(
+                "unknown placeholder in the command",
+                key="command",
+                value=f"{{{name}}}",
+                expected="one of " + ", ".join(f"{{{one}}}" for one in known),
+                suggestion=nearest(name, known),
+            )
+        for name in needs:
+            if name not in used:
+                message = f"the command does not say where {{{name}}} goes"
+                expected = "something like mytracer {scene} {output}"
+                raise InputError.of(message, key="command", value=text, expected=expected)
+        return cls(words)
+
+    def fill(self, values: Mapping[str, object]) -> list[str]:
+        """The arguments, each placeholder replaced within its own word."""
+        every = {"python": sys.executable, **values}
+        return [_PLACEHOLDER.sub(lambda found: str(every[found[1]]), w) for w in self.words]
+
+    def constants(self) -> list[str]:
+        """The arguments that are the same for all images."""
+        per_image = set(_PLACEHOLDERS) - {"python"}
+        fixed = [w for w in self.words if not per_image & set(_PLACEHOLDER.findall(w))]
+        return Template(tuple(fixed)).fill({})
+
+    def program(self) -> str:
+        """What does the work: the script, where the command runs one by an interpreter."""
+        first, *others = self.constants() or self.words
+        interpreted = re.fullmatch(r"(python|node|ruby|perl|julia|bash|sh)[\d.]*", Path(first).name)
+        scripts = [word for word in others if not word.startswith("-")]
+        return scripts[0] if interpreted and scripts else first
+
+
+class CommandRenderer:
+    """Runs `template` in `folder` for every image, with files in a private temporary folder.
+
+    `encoding` is what integer values in an image mean, where the file itself does not say.
+    Without a declared `version` it is the hash of the files that the command names, so that a
+    changed program is another version.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        template: Template,
+        folder: Path,
+        *,
+        image_format: ImageFormat = "exr",
+        encoding: Encoding | None = None,
+        capabilities: frozenset[Capability] = USUAL_CLAIMS,
+        version: str = "",
+    ) -> None:
+        self._name = name
+        self._template = template
+        self._folder = folder
+        self._image_format = image_format
+        self._encoding = encoding
+        self._capabilities = capabilities
+        self._version = version
+
+    @property
+    def name(self) -> str:
+        return self._name
+
+    @property
+    def capabilities(self) -> frozenset[Capability]:
+        return self._capabilities
+
+    def version(self) -> str:
+        """Raises RendererMissing where the executable cannot be found."""
+        found = program_version(self._template.constants(), self._folder)
+        return self._version or found
+
+    def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
+        """Raises RendererMissing, RendererUnsupported or RendererFailed."""
+        require(scene, self.name, self.capabilities)
+        with tempfile.TemporaryDirectory(prefix="snellcheck-") as private:
+            output = Path(private) / f"image.{self._image_format}"
+            scene_file = self.emit(scene, Path(private))
+            values = {
+                "scene": scene_file,
+                "output": output,
+                "width": scene.film.width,
+                "height": scene.film.height,
+                "samples": settings.samples,
+                "seed": settings.seed,
+                "threads": settings.threads,
+            }
+            done = run_limited(
+                self._template.fill(values),
+                cwd=self._folder,
+                timeout_s=settings.timeout_s,
+                memory_mb=settings.memory_mb,
+                env={**os.environ, "TMPDIR": private},
+            )
+            log = tail(done.stderr.strip() or done.stdout)
+            if done.returncode != 0:
+                raise RendererFailed(f"ended with exit code {done.returncode}", log=log)
+            pixels, info = delivered(output, scene.film, log=log, encoding=self._encoding)
+        shown = values | {"scene": scene_file.name, "output": output.name}
+        return Image(
+            pixels,
+            seconds=done.wall_s,
+            log="\n".join(filter(None, (log, described(info)))),
+            command=shlex.join(self._template.fill(shown)),
+        )
+
+    def health(self) -> Health:
+        """Probes with a tiny render. Never raises."""
+        version = ""
+        try:
+            version = self.version()
+            prove(self.render(proof_scene(self.capabilities), RenderSettings(timeout_s=30)))
+        except RendererError as error:
+            detail = " ".join([str(error), *error.log.splitlines()[-1:]])
+            return Health(self.name, usable=False, version=version, detail=detail)
+        except OSError as error:
+            return Health(self.name, usable=False, version=version, detail=str(error))
+        return Health(self.name, usable=True, version=version, path=str(self._folder))
+
+    def emit(self, scene: ResolvedScene, folder: Path) -> Path:
+        """Writes scene.json, which is all that the program is given."""
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / "scene.json"
+        path.write_text(scene.model_dump_json(), encoding="utf-8")
+        return path
+
+
+def program_version(words: list[str], folder: Path) -> str:
+    """The hash of the executable and of all files among its arguments.
+
+    Raises RendererMissing where the executable cannot be found from `folder`.
+    """
+    program = words[0]
+    found = folder / program if os.sep in program else Path(shutil.which(program) or "")
+    if not found.is_file():
+        raise RendererMissing(f"cannot find the program {program!r}")
+    digest = hashlib.sha256()
+    for path in [found, *(folder / word for word in words[1:] if word)]:
+        if path.is_file():
+            digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return f"sha256:{digest.hexdigest()[:12]}"

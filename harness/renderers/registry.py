@@ -1,0 +1,119 @@
+"""All renderers by name: ours and those of other packages, through the same entry points.
+
+A package offers a renderer by an entry point of the group ``snellcheck.renderers``: a callable
+without arguments that returns a `harness.renderers.base.Renderer`. Nothing is imported before a
+renderer is asked for, and Mitsuba and the tracer never are in this process.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+
+from harness.errors import InputError, RendererFailed, nearest
+from harness.renderers.base import Renderer
+
+GROUP = "snellcheck.renderers"
+Factory = Callable[[], Renderer]
+
+INSTALL_MITSUBA = "pip install 'snellcheck[mitsuba]'"
+
+
+def available() -> dict[str, Factory]:
+    """All that are registered, by name, in alphabetical order.
+
+    A factory raises RendererFailed where the package that registered it cannot be loaded, or
+    where two packages claim the name.
+    """
+    found: dict[str, set[EntryPoint]] = {}
+    for entry in entry_points(group=GROUP):
+        found.setdefault(entry.name, set()).add(entry)
+    return {name: functools.partial(_load, name, found[name]) for name in sorted(found)}
+
+
+def create(name: str) -> Renderer:
+    """The registered renderer `name`. Raises InputError where there is none, or as its factory."""
+    factories = available()
+    if name not in factories:
+        raise InputError.of(
+            "unknown renderer",
+            key="--renderer",
+            value=name,
+            expected="one of " + ", ".join(factories),
+            suggestion=nearest(name, factories),
+        )
+    return factories[name]()
+
+
+def command_renderer(template: str, folder: Path | None = None) -> Renderer:
+    """The renderer of a command line like ``mytracer {scene} {output}``. Raises InputError."""
+    from harness.renderers.command_file import renderer_from_command
+
+    return renderer_from_command(template, folder or Path.cwd())
+
+
+def configured_renderer(path: Path) -> Renderer:
+    """The renderer that a snellcheck-renderer.toml describes. Raises InputError."""
+    from harness.renderers.command_file import renderer_from_file
+
+    return renderer_from_file(path)
+
+
+def _load(name: str, entries: set[EntryPoint]) -> Renderer:
+    if len(entries) > 1:
+        claims = " and ".join(sorted(_origin(entry) for entry in entries))
+        raise RendererFailed(f"two packages claim the renderer {name!r}: {claims}")
+    (entry,) = entries
+    try:
+        renderer = entry.load()()
+    except Exception as error:  # a third party's code can raise anything
+        reason = f"{type(error).__name__}: {error}".rstrip(": ")
+        message = f"the renderer {name!r} of {_origin(entry)} cannot be loaded: {reason}"
+        raise RendererFailed(message) from error
+    if missing := [m for m in ("version", "render", "health", "emit") if not hasattr(renderer, m)]:
+        what = f"it is a {type(renderer).__name__} without {', '.join(missing)}"
+        raise RendererFailed(f"the renderer {name!r} of {_origin(entry)} is none: {what}")
+    return renderer  # type: ignore[no-any-return]
+
+
+def _origin(entry: EntryPoint) -> str:
+    package = f"{entry.dist.name} {entry.dist.version}" if entry.dist else "an unknown package"
+    return f"{package} ({entry.value})"
+
+
+# --- the built-in renderers, registered in pyproject.toml -----------------------------------------
+
+
+def tracer() -> Renderer:
+    """The tracer of this project, in a worker."""
+    from harness.renderers.persistent import WorkerRenderer
+
+    return WorkerRenderer("tracer", "harness.renderers.tracer:TracerEngine")
+
+
+def povray() -> Renderer:
+    """The povray executable, one process an image."""
+    from harness.renderers.povray import PovRayRenderer
+
+    return PovRayRenderer()
+
+
+def mitsuba() -> Renderer:
+    """Mitsuba as its users run it, in a worker."""
+    return _mitsuba("mitsuba", "StockEngine")
+
+
+def mitsuba_exact() -> Renderer:
+    """Mitsuba's scene and materials, with both lobes followed, in a worker."""
+    return _mitsuba("mitsuba-exact", "ExactEngine")
+
+
+def _mitsuba(name: str, engine: str) -> Renderer:
+    from harness.renderers.mitsuba_variants import child_environment
+
+    from harness.renderers.persistent import WorkerRenderer
+
+    target = f"harness.renderers.mitsuba:{engine}"
+    return WorkerRenderer(name, target, env=child_environment, remedy=INSTALL_MITSUBA)
