@@ -18,6 +18,7 @@ from hypothesis.extra import numpy as hnp
 
 from harness import imagefile
 from harness.errors import InputError
+from tests.fakes import misbehave
 
 
 def pixels(height: int = 5, width: int = 7) -> np.ndarray:
@@ -282,6 +283,14 @@ def test_a_header_that_claims_too_much_costs_nothing(tmp_path: Path) -> None:
 def test_npy_of_another_kind(array: np.ndarray, message: str, tmp_path: Path) -> None:
     np.save(tmp_path / "a.npy", array, allow_pickle=True)
     assert message in problem(tmp_path / "a.npy")
+
+
+def test_a_pickle_is_never_loaded(tmp_path: Path) -> None:
+    misbehave.wrong_type(tmp_path / "a.npy", 8, 8)
+    assert "got object" in problem(tmp_path / "a.npy")
+    assert [p.name for p in tmp_path.iterdir()] == ["a.npy"]
+    np.load(tmp_path / "a.npy", allow_pickle=True)
+    assert (tmp_path / "unpickled").exists()  # the trap would have worked
 
 
 def test_png_of_another_kind(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ from harness.renderers.process import run_limited, tail
 from harness.renderers.proof import proof_scene, prove
 from harness.scene.resolved import ResolvedScene
 
-ImageFormat = Literal["exr", "pfm", "npy", "png"]
+ImageFormat = Literal["exr", "pfm", "npy", "png", "ppm"]
 
 # What a renderer is taken to claim that does not say. RAYS needs the persistent protocol; the
 # others are rare, and wrongly assumed they would spoil measurements rather than fail them.

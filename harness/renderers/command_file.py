@@ -37,7 +37,7 @@ class RendererTable(BaseModel):
     command: str
     format: ImageFormat = "exr"
     encoding: Encoding | None = None
-    capabilities: Annotated[list[Capability], Field(strict=False)] | None = None
+    capabilities: list[Annotated[Capability, Field(strict=False)]] | None = None
     persistent: bool = False
     version: str = ""
 
@@ -45,11 +45,14 @@ class RendererTable(BaseModel):
 def renderer_from_file(path: Path) -> Renderer:
     """The renderer that `path` describes. Raises InputError with all that is wrong with it."""
     document = parse_document(read_source(path), path)
+    findings = [_unknown((key,), ["renderer"]) for key in document if key != "renderer"]
+    if "renderer" not in document:
+        findings = findings or [Finding(("renderer",), "missing", None, "a table [renderer]")]
+        raise input_error(findings, path)
     try:
-        table = RendererTable.model_validate(document.get("renderer", {}))
-        findings = [_unknown((key,), ["renderer"]) for key in document if key != "renderer"]
+        table = RendererTable.model_validate(document["renderer"])
     except ValidationError as error:
-        raise input_error(map(_finding, error.errors()), path) from error
+        findings += map(_finding, error.errors())
     if findings:
         raise input_error(findings, path)
     try:
