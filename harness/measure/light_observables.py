@@ -11,19 +11,17 @@ from numpy.typing import NDArray
 
 from harness import expected
 from harness.expected import Float
+from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
-from harness.measure.finding import Finding, Unmeasurable
 from harness.measure.probe_truth import ProbeTruth
+from harness.measure.statistics import binned
 from harness.probe.decode import lit_threshold
 from harness.renderers.base import Status
-
-# Pixels per bin where the renderer samples: enough for the mean's error to be normal.
-BIN = 256
 
 
 def path_weight(
     truth: ProbeTruth, pixels: NDArray[np.float32], epsilon: float, quantum: float, n2: bool
-) -> Finding:
+) -> Comparison:
     """Reflectance or transmittance of the path, per pixel, of a renderer without noise.
 
     `n2` says that the renderer's radiance scales with the square of the index: then light that was
@@ -50,7 +48,7 @@ def path_weight(
         truth, used, "Weight of the path", "weight (green)",
         measured[:, 1], true[:, 1], tolerance[:, 1],
     )  # fmt: skip
-    return Finding(
+    return Comparison(
         float(measured[k, channel]), float(true[k, channel]), float(tolerance[k, channel]),
         bool(np.all(error[used] <= tolerance[used])),
         "quantum of the image + 8 eps per rounding chain x condition of the Fresnel factors",
@@ -60,40 +58,18 @@ def path_weight(
 
 def sampled_path_weight(
     truth: ProbeTruth, pixels: NDArray[np.float32], level: float, n2: bool
-) -> Finding:
+) -> Comparison:
     """The same for a renderer that samples its lobes: means over bins of like angle.
 
-    Each bin's standard error comes from the scatter of its own pixels. `level` is the chance of a
-    false alarm over all bins together (Šidák), judged by Student's t.
+    `level` is the chance of a false alarm over all bins together.
     """
-    from scipy.stats import t as student
-
-    measured = pixels.reshape(-1, 3).astype(np.float64)
     true, used = _expected_level(truth, n2)
     rows = np.flatnonzero(used)
-    if len(rows) < BIN:
-        raise Unmeasurable(f"{len(rows)} pixels are too few: a bin needs {BIN}")
-    order = rows[np.argsort(truth.theta_i[rows])]
-    bins = np.array_split(order, max(1, len(order) // BIN))
-    residual = np.array([(measured[b] - true[b]).mean(axis=0) for b in bins])
-    scatter = [(measured[b] - true[b]).std(axis=0, ddof=1) / np.sqrt(len(b)) for b in bins]
-    per_test = 1 - (1 - level) ** (1 / residual.size)
-    limit = student.isf(per_test / 2, BIN - 1)
-    # A bin in which every sample fell alike has no scatter; one sample in the bin could differ.
-    error = np.maximum(np.array(scatter), 1 / (BIN * 64)) * limit
-    k, channel = np.unravel_index(int((np.abs(residual) / error).argmax()), residual.shape)
-    theta = np.array([np.degrees(truth.theta_i[b]).mean() for b in bins])
-    return Finding(
-        float(measured[bins[k], channel].mean()), float(true[bins[k], channel].mean()),
-        float(error[k, channel]), bool(np.all(np.abs(residual) <= error)),
-        f"{limit:.2f} standard errors of a bin's mean: Student's t, {BIN - 1} degrees of freedom, "
-        f"family-wise level {level:g} over {residual.size} bins",
-        detail={"max": float(np.abs(residual).max()), "rms": float(np.sqrt((residual**2).mean())),
-                "bins": len(bins), "rays": len(rows), "worst_theta_i_deg": float(theta[k])},
-    )  # fmt: skip
+    order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
+    return binned(pixels.reshape(-1, 3).astype(np.float64), true, order, level)
 
 
-def critical_angle(truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float) -> Finding:
+def critical_angle(truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float) -> Comparison:
     """Angle of incidence at which light stops passing, degrees, between lit and dark pixels."""
     ior = [medium.ior for medium in truth.scene.media]
     solid = truth.scene.solids[0]
@@ -103,7 +79,7 @@ def critical_angle(truth: ProbeTruth, pixels: NDArray[np.float32], quantum: floa
 
 def first_transmitting_angle(
     truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float
-) -> Finding:
+) -> Comparison:
     """Smallest angle of incidence at which a prism transmits, degrees, in its principal plane."""
     from harness.measure.ray_observables import apex_angle, principal
 
@@ -124,7 +100,7 @@ def _boundary(
     quantum: float,
     closed: float,
     lit_below: bool,
-) -> Finding:
+) -> Comparison:
     """Where the middle row turns from lit to dark, against the closed form.
 
     The angle is known to half the distance between the last lit and the first dark ray. A ray so
@@ -153,7 +129,7 @@ def _boundary(
     tolerance = max(float(tolerance), spacing / 2) + (spacing if faint.any() else 0)
     ordered = bool(low < high)
     within = ordered and abs(value - closed) <= tolerance
-    return Finding(
+    return Comparison(
         float(np.degrees(value)), float(np.degrees(closed)), float(np.degrees(tolerance)), within,
         "half the distance between the rays on both sides of the limit, and the width of the band "
         "in which the true light is below 4 quanta",

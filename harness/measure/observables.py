@@ -15,7 +15,7 @@ class Observable(enum.StrEnum):
     unit: str
     meaning: str
 
-    def __new__(cls, name: str, unit: str, meaning: str) -> Observable:
+    def __new__(cls, name: str, unit: str = "", meaning: str = "") -> Observable:
         member = str.__new__(cls, name)
         member._value_ = name
         member.unit = unit
@@ -31,25 +31,43 @@ class Observable(enum.StrEnum):
     DELTA_E = "delta_e", "", "colour difference CIEDE2000"
 
     # Rays, measured through position codes or a ray API.
-    INTERNAL_ANGLE = "internal_angle", "µrad", "direction of the refracted ray inside the medium"
+    INTERNAL_ANGLE = "internal_angle", "deg", "direction of the refracted ray inside the medium"
     EXIT_DIRECTION = "exit_direction", "µrad", "direction in which a ray leaves the glass"
     EXIT_POINT = "exit_point", "units", "where a ray that left the glass lands on the backdrop"
     SLAB_OFFSET = "slab_offset", "units", "sideways shift of a ray through a slab"
     TIR = "tir", "", "rays whose total internal reflection is wrongly decided"
-    CRITICAL_ANGLE = "critical_angle", "µrad", "angle at which total internal reflection begins"
-    DEVIATION = "deviation", "µrad", "angle by which a prism turns a ray"
-    MINIMUM_DEVIATION = "minimum_deviation", "µrad", "smallest deviation over all incidences"
+    CRITICAL_ANGLE = "critical_angle", "deg", "angle at which total internal reflection begins"
+    DEVIATION = "deviation", "deg", "angle by which a prism turns a ray"
+    MINIMUM_DEVIATION = "minimum_deviation", "deg", "smallest deviation over all incidences"
     FIRST_TRANSMITTING_ANGLE = (
         "first_transmitting_angle",
-        "µrad",
+        "deg",
         "smallest angle of incidence at which a prism transmits",
     )
-    INVERSION = "inversion", "", "whether a view through a lens is upside down"
+    INVERSION = "inversion", "", "magnification of the view through a lens; negative: upside down"
 
     # Light.
     REFLECTANCE = "reflectance", "", "reflected part of the radiance"
     TRANSMITTANCE = "transmittance", "", "transmitted part of the radiance"
     RADIANCE = "radiance", "radiance", "radiance of a pixel or a region"
 
-    # Several renders together.
-    CONVERGENCE_ORDER = "convergence_order", "", "order in which a mesh nears the smooth shape"
+    # Polygons in place of a smooth shape.
+    TESSELLATION_ERROR = (
+        "tessellation_error",
+        "µrad",
+        "RMS angle between rays through the polygons and rays through the sphere they stand for",
+    )
+
+
+# Observables of a picture, as opposed to a probe.
+IMAGE_OBSERVABLES = frozenset(
+    {
+        Observable.SSIM,
+        Observable.RMSE,
+        Observable.PSNR,
+        Observable.MAX_DIFFERENCE,
+        Observable.P999_DIFFERENCE,
+        Observable.DELTA_E,
+        Observable.RADIANCE,
+    }
+)

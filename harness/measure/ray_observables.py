@@ -1,7 +1,7 @@
 """Observables of single rays: each compares one renderer's rays with their truth.
 
 Every function takes the truth and the measurement of the same rays, the relative precision
-`epsilon` of the renderer's arithmetic, and returns a `Finding`. Rays that graze an edge are left
+`epsilon` of the renderer's arithmetic, and returns a `Comparison`. Rays that graze an edge are left
 out and counted; a ray that should arrive and does not, or the other way round, is a fault.
 """
 
@@ -12,22 +12,24 @@ from numpy.typing import NDArray
 
 from harness import expected
 from harness.expected import Float
+from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
-from harness.measure.finding import Finding, Unmeasurable
 from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.rays import RayMeasurement
 from harness.record import Curve
 from harness.renderers.base import Status
+from harness.scene.resolved import Mesh, Solid, Sphere
+from harness.truth import follow
 
 
-def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
     """Distance between measured and true landing point on the first plane, scene units."""
     used, fault, counts = _used(truth, rays)
     error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1)
     tolerance = rays.point_uncertainty + truth.point_tolerance(epsilon)
     vector = (rays.point - truth.landings[0].point)[_worst(error, tolerance, used)]
     detail = counts | {f"worst_d{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
-    return _finding(
+    return _comparison(
         truth, error, 0.0, tolerance, used, fault, detail,
         _derivation(rays, "8 eps per rounding chain x condition of the landing point"),
         curve_of_rows(
@@ -36,13 +38,13 @@ def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Findi
     )  # fmt: skip
 
 
-def exit_direction(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+def exit_direction(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
     """Angle between measured and true direction after the last interface, microradians."""
     direction = _direction(rays)
     used, fault, counts = _used(truth, rays)
     error = _angle(direction, truth.paths.direction) * 1e6
     tolerance = (rays.direction_uncertainty + truth.direction_tolerance(epsilon)) * 1e6
-    return _finding(
+    return _comparison(
         truth, error, 0.0, tolerance, used, fault, counts,
         _derivation(rays, "8 eps per rounding chain x condition of the direction"),
         curve_of_rows(
@@ -51,7 +53,7 @@ def exit_direction(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> F
     )  # fmt: skip
 
 
-def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
     """Angle of refraction inside the medium, degrees, against asin(ior_i sin(theta_i) / ior_t).
 
     The plane must be immersed: the ray's way from the true point of entry to its landing point is
@@ -66,7 +68,7 @@ def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> F
     true = expected.snell_angle(truth.theta_i, ior_i, ior_t)
     shift = rays.point_uncertainty + truth.point_tolerance(epsilon)
     tolerance = np.degrees(shift / length)
-    return _finding(
+    return _comparison(
         truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
         _derivation(rays, "tolerance of the landing point / length of the way inside"),
         curve_of_rows(
@@ -76,7 +78,7 @@ def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> F
     )  # fmt: skip
 
 
-def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
     """Sideways shift of the ray by a parallel slab, scene units, positive as glass shifts it.
 
     Measured against the line of the incident ray; the truth is the closed form for the slab's
@@ -99,14 +101,14 @@ def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Find
     tolerance = rays.point_uncertainty + truth.point_tolerance(epsilon)
     worst = np.abs(offset - true)[used].max()
     counts |= {"thickness": thickness, "max_relative_to_thickness": float(worst / thickness)}
-    return _finding(
+    return _comparison(
         truth, offset, true, tolerance, used, fault, counts,
         _derivation(rays, "the offset moves no more than the landing point"),
         curve_of_rows(truth, used, "Slab offset", "offset (units)", offset, true, tolerance),
     )  # fmt: skip
 
 
-def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
     """Deviation by a prism in its principal plane, degrees; the image's middle row lies in it."""
     direction = _direction(rays)
     used, fault, counts = _used(truth, rays)
@@ -119,7 +121,7 @@ def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Findin
     true = np.abs(expected.prism_deviation(signed_incidence(truth), apex, ior_t / ior_i))
     tolerance = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(epsilon))
     counts |= {"apex_deg": float(np.degrees(apex))}
-    return _finding(
+    return _comparison(
         truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
         _derivation(rays, "tolerance of the exit direction"),
         curve_of_rows(
@@ -129,7 +131,7 @@ def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Findin
     )  # fmt: skip
 
 
-def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Finding:
+def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
     """Smallest deviation of the curve, degrees, by a parabola through its lowest samples.
 
     The same estimate on the true curve at the same angles tells the estimate's own error, which is
@@ -149,7 +151,7 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -
     value = _vertex(theta, np.degrees(_angle(direction, truth.rays.directions)[used])) - bias
     bound = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(epsilon))[used]
     tolerance = 3 * float(bound[np.argsort(np.abs(true_curve - true_curve.min()))[:7]].max())
-    return Finding(
+    return Comparison(
         value, float(closed), tolerance, bool(abs(value - closed) <= tolerance) and not fault,
         "tolerance of the deviation x 3, the norm of the parabola's vertex over seven samples; "
         f"the estimate's own error {bias:.1e} deg is taken off", fault,
@@ -157,7 +159,7 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -
     )  # fmt: skip
 
 
-def tir(truth: ProbeTruth, rays: RayMeasurement, _epsilon: float) -> Finding:
+def tir(truth: ProbeTruth, rays: RayMeasurement, _epsilon: float) -> Comparison:
     """Rays lit where there is total internal reflection, or dark where light must pass."""
     fate = truth.paths.status
     clear = ~truth.grazing & ~rays.faint & np.isin(fate, (Status.HIT, Status.TIR))
@@ -173,11 +175,82 @@ def tir(truth: ProbeTruth, rays: RayMeasurement, _epsilon: float) -> Finding:
         "dark_below_critical": int(lost.sum()), "excluded_near_critical": int((~clear).sum()),
         "method": rays.method,
     }  # fmt: skip
-    return Finding(
+    return Comparison(
         wrong, 0, 0, wrong == 0,
         "a count: rays within the probe's resolution of the critical angle are left out",
         detail=detail,
     )  # fmt: skip
+
+
+def inversion(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+    """Magnification of the view through a lens; negative is upside down.
+
+    How fast the landing point climbs with the pixel in the middle of the image, relative to the
+    view without glass. The truth is the closed form of the same rays, put through the same fit.
+    """
+    used, fault, counts = _used(truth, rays)
+    film = truth.scene.film
+    column = np.arange(film.width * film.height) % film.width == film.width // 2
+    row = np.arange(film.width * film.height) // film.width
+    near = used & column & (np.abs(row - (film.height - 1) / 2) <= 4)
+    if near.sum() < 4:
+        raise Unmeasurable("the middle of the image does not see the plane through the glass")
+    up, frame = np.array(truth.scene.camera.up), truth.planes[0].frame
+    d, o = truth.rays.directions, truth.rays.origins
+    t = ((np.array(frame.origin) - o) @ np.array(frame.z)) / (d @ np.array(frame.z))
+    straight = ((o + t[:, None] * d) @ up)[near]
+
+    def slope(points: Float) -> float:
+        return float(np.polyfit(straight, (points @ up)[near], 1)[0])
+
+    value, true = slope(rays.point), slope(truth.landings[0].point)
+    bound = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    tolerance = 2 * float(bound[near].max()) / float(np.ptp(straight))
+    upright = "upright" if true > 0 else "inverted"
+    return Comparison(
+        value, true, tolerance, bool(abs(value - true) <= tolerance) and not fault,
+        "tolerance of the landing point at both ends / height of the fitted view", fault,
+        counts | {"view": upright, "rays": int(near.sum())},
+    )  # fmt: skip
+
+
+def tessellation_error(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+    """RMS angle between rays through a polygon ball and through its sphere, microradians.
+
+    The truth of the polygons themselves is in closed form too, so the value to expect is known.
+    """
+    direction = _direction(rays)
+    used, fault, counts = _used(truth, rays)
+    sphere = _circumscribed(truth.scene.solids[0])
+    smooth = follow(truth.scene.model_copy(update={"solids": (sphere,)}), truth.rays, truth.path)
+    used = used & (smooth.status == Status.HIT)
+
+    def rms(d: Float) -> float:
+        return float(np.sqrt(np.mean(_angle(d[used], smooth.direction[used]) ** 2)) * 1e6)
+
+    value, true = rms(direction), rms(truth.paths.direction)
+    bound = (rays.direction_uncertainty + truth.direction_tolerance(epsilon))[used]
+    tolerance = float(np.sqrt(np.mean(bound**2)) * 1e6)
+    solid = truth.scene.solids[0].shape
+    counts |= {"triangles": len(solid.triangles) if isinstance(solid, Mesh) else 0}
+    return Comparison(
+        value, true, tolerance, bool(abs(value - true) <= tolerance) and not fault,
+        "root mean square of the tolerances of the exit directions", fault, counts,
+    )  # fmt: skip
+
+
+def _circumscribed(solid: Solid) -> Solid:
+    """The sphere on which all vertices of a polygon ball lie."""
+    if not isinstance(solid.shape, Mesh):
+        raise Unmeasurable("only a ball of polygons has a tessellation error")
+    vertices = np.array(solid.shape.vertices)
+    center = vertices.mean(axis=0)
+    radius = np.linalg.norm(vertices - center, axis=1)
+    if np.ptp(radius) > 1e-9 * radius.mean():
+        raise Unmeasurable("the vertices do not lie on a sphere")
+    x, y, z = (float(c) for c in center)
+    sphere = Sphere(center=(x, y, z), radius=float(radius.mean()))
+    return solid.model_copy(update={"shape": sphere})
 
 
 # --- geometry of a prism --------------------------------------------------------------------------
@@ -280,7 +353,7 @@ def _derivation(rays: RayMeasurement, arithmetic: str) -> str:
     return f"quantum of the image through the {rays.method} + {arithmetic} ({ROUNDINGS} roundings)"
 
 
-def _finding(
+def _comparison(
     truth: ProbeTruth,
     value: Float,
     true: Float | float,
@@ -290,7 +363,7 @@ def _finding(
     detail: dict[str, float | int | str],
     derivation: str,
     curve: Curve,
-) -> Finding:
+) -> Comparison:
     wanted = np.broadcast_to(true, value.shape)
     error = np.abs(value - wanted)
     if not np.isfinite(error[used]).all() or not np.isfinite(tolerance[used]).all():
@@ -307,7 +380,7 @@ def _finding(
         **detail,
     }
     within = bool(np.all(error[used] <= tolerance[used])) and not fault
-    return Finding(
+    return Comparison(
         float(value[k]), float(wanted[k]), float(tolerance[k]), within, derivation, fault,
         detail, curve,
     )  # fmt: skip

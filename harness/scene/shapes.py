@@ -47,11 +47,11 @@ BOX_FACES: Faces = (
 )
 # Corners of a prism: apex, entry side, exit side of the base; first at -y, then at +y.
 PRISM_FACES: Faces = (
-    (0, 1, 4, 3),  # entry
-    (0, 3, 5, 2),  # exit
-    (1, 2, 5, 4),  # base
-    (0, 2, 1),  # -y
-    (3, 4, 5),  # +y
+    (3, 4, 1, 0),  # entry
+    (2, 5, 3, 0),  # exit
+    (4, 5, 2, 1),  # base
+    (1, 2, 0),  # -y
+    (5, 4, 3),  # +y
 )
 
 

@@ -8,12 +8,13 @@ from harness.record import Curve
 
 
 @dataclass(frozen=True)
-class Finding:
+class Comparison:
     """One observable of one renderer. `within` is the verdict on all rays or pixels.
 
-    `value`, `expected` and `tolerance` are those of the ray or pixel that comes closest to its
-    limit or oversteps it most, in the observable's unit, so that |value - expected| <= tolerance says the same as `within`
-    unless `fault` names what else is wrong (rays missing, light where there should be none).
+    `value`, `expected` and `tolerance`, in the observable's unit, are those of the ray or pixel
+    that comes closest to its limit or oversteps it most, so |value - expected| <= tolerance says
+    the same as `within`, unless `fault` names what else is wrong (rays that did not arrive, light
+    where there should be none).
     """
 
     value: float

@@ -1,0 +1,170 @@
+"""What a run leaves behind: records, images, and the scenes that renderers were given."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from harness import __version__, plan, record
+from harness.errors import RendererError, RendererFailed
+from harness.judge import Judgement
+from harness.plan import PreparedCase
+from harness.record import CaseRecord, DifferenceMap, ImageFile, RendererRun, Table, Verdict, worst
+from harness.renderers.base import Image, RenderSettings
+from harness.results import Contender, Results
+
+LOG_LINES = 40
+# The range of all difference maps, so that they can be compared: a float32 renderer's errors show
+# as dark, what an eye could see as bright.
+DIFFERENCE_LIMIT = 1e-3
+
+
+def folder_name(case_id: str) -> str:
+    """A file name for a case: letters, digits and ``._-`` only, and unique."""
+    plain = "".join(c if c.isalnum() or c in "._-" else "_" for c in case_id)[:80]
+    return f"{plain}-{hashlib.sha256(case_id.encode()).hexdigest()[:8]}"
+
+
+class Archive:
+    """The folder of one run."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def write_case(
+        self,
+        case: PreparedCase,
+        contenders: list[Contender],
+        results: Results,
+        judgement: Judgement,
+        seconds: Mapping[str, float],
+        settings: RenderSettings,
+        *,
+        quality: str,
+        started: str,
+        wall_s: float,
+    ) -> CaseRecord:
+        """Writes the images of a case, its scene and its record; returns the record."""
+        loaded, name = case.loaded, folder_name(case.loaded.id)
+        scene_json = case.scene.model_dump_json()
+        record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
+        runs = [self._run(c, name, results, judgement, seconds, settings) for c in contenders]
+        written = CaseRecord(
+            id=loaded.id,
+            case=loaded.case,
+            family=loaded.model.family,
+            title=loaded.model.title,
+            description=loaded.model.description.strip(),
+            lecture=loaded.model.lecture,
+            sources=list(loaded.model.sources),
+            formula=loaded.model.formula,
+            parameters=dict(loaded.parameters),
+            scene_sha256=hashlib.sha256(scene_json.encode()).hexdigest(),
+            scene_file=f"{loaded.file.parent.name}/{loaded.file.name}",
+            quality=quality,
+            snellcheck_version=__version__,
+            started=started,
+            wall_s=wall_s,
+            status=worst([check.status for check in judgement.checks]),
+            runs=runs,
+            checks=judgement.checks,
+            curves=judgement.curves,
+            differences=self._differences(name, contenders, results),
+            tables=[Table.model_validate(t.model_dump(mode="json")) for t in loaded.model.tables],
+            files={"scene.json": f"scenes/{name}.json"},
+        )
+        record.write(written, self.root / "records" / f"{name}.json")
+        return written
+
+    def _run(
+        self,
+        contender: Contender,
+        name: str,
+        results: Results,
+        judgement: Judgement,
+        seconds: Mapping[str, float],
+        settings: RenderSettings,
+    ) -> RendererRun:
+        mine = {role: r for (who, role), r in results.by_role.items() if who == contender.name}
+        errors = [r for r in mine.values() if isinstance(r, RendererError)]
+        status, reason = Verdict.PASS, contender.reason
+        if contender.absent is not None:
+            status = contender.absent
+        elif errors:
+            failed = any(isinstance(e, RendererFailed) for e in errors)
+            status, reason = Verdict.ERROR if failed else Verdict.SKIP, str(errors[0])
+        else:
+            checks = [c.status for c in judgement.checks if c.renderer == contender.name]
+            status = worst(checks) if checks else Verdict.PASS
+        images = [r for r in mine.values() if isinstance(r, Image)]
+        logs = [e.log for e in errors] + [i.log for i in images if i.log]
+        return RendererRun(
+            name=contender.name,
+            version=contender.version,
+            status=status,
+            reason=reason,
+            render_s=seconds.get(contender.name, 0.0),
+            renders=len(mine),
+            command=next((i.command for i in images if i.command), ""),
+            log_tail="\n".join(logs[0].splitlines()[-LOG_LINES:]) if logs else "",
+            settings=dataclasses.asdict(settings),
+            images=self._images(contender.name, name, mine),
+        )
+
+    def _images(self, renderer: str, name: str, mine: Mapping[str, object]) -> list[ImageFile]:
+        from harness import imagefile
+        from harness.report.pictures import write_picture, write_thumbnail
+
+        files = []
+        for role in (plan.IMAGE, plan.VIEW):
+            image = mine.get(role)
+            if not isinstance(image, Image):
+                continue
+            stem = f"images/{name}/{renderer}-{role}"
+            imagefile.write_exr(self.root / f"{stem}.exr", image.pixels)
+            write_picture(image.pixels, self.root / f"{stem}.webp")
+            write_thumbnail(image.pixels, self.root / f"{stem}-small.webp")
+            pixels = np.ascontiguousarray(image.pixels, np.dtype("<f4"))
+            height, width = pixels.shape[:2]
+            files.append(
+                ImageFile(
+                    role=role,
+                    path=f"{stem}.exr",
+                    picture=f"{stem}.webp",
+                    thumbnail=f"{stem}-small.webp",
+                    sha256=hashlib.sha256(pixels.tobytes()).hexdigest(),
+                    width=width,
+                    height=height,
+                )
+            )
+        return files
+
+    def _differences(
+        self, name: str, contenders: list[Contender], results: Results
+    ) -> list[DifferenceMap]:
+        from harness.report.pictures import write_difference
+
+        pictures = {}
+        for contender in contenders:
+            image = results.by_role.get((contender.name, plan.IMAGE))
+            if isinstance(image, Image) and image.pixels.shape[:2] == (
+                results.height, results.width,
+            ):  # fmt: skip
+                pictures[contender.name] = image.pixels
+        maps = []
+        for a, b in combinations(pictures, 2):
+            path = f"images/{name}/difference-{a}-{b}.webp"
+            write_difference(pictures[a], pictures[b], DIFFERENCE_LIMIT, self.root / path)
+            maps.append(DifferenceMap(a=a, b=b, path=path, limit=DIFFERENCE_LIMIT, unit="radiance"))
+        return maps
+
+
+def scene_text(case: PreparedCase) -> str:
+    """scene.json, indented for people."""
+    return json.dumps(json.loads(case.scene.model_dump_json()), indent=1)

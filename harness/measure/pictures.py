@@ -1,0 +1,176 @@
+"""Two pictures of the same scene: how far apart they are, and how far apart they may be.
+
+A pixel tells little where a tiny shift of its ray changes everything, as at the edge of a checker
+cell seen through a ball. So a reference picture is rendered again with its camera shifted by the
+renderers' own geometric error: what changes by more than `GRAZING` grazes an edge and is counted
+apart, and what changes by less adds to the tolerance of its pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from harness.expected import Float
+from harness.measure import images
+from harness.measure.comparison import Comparison, Unmeasurable
+from harness.measure.images import Mask, Pixels
+from harness.measure.observables import Observable
+from harness.measure.probe_truth import ROUNDINGS
+
+GRAZING = 1e-3
+# More grazing pixels than this share would hide a wrong picture behind them.
+MOST_GRAZING = 0.02
+
+
+def geometric_error(extent: float, interfaces: int, epsilon: float) -> float:
+    """How far the ray of a renderer of relative precision `epsilon` may stray, units."""
+    return ROUNDINGS * (interfaces + 1) * epsilon * extent
+
+
+def sensitivity(picture: Pixels, shifted: Sequence[Pixels]) -> Float:
+    """(H, W) the largest change of any channel over the shifted pictures."""
+    return np.asarray(np.max([images.difference(picture, other) for other in shifted], axis=0))
+
+
+@dataclass(frozen=True)
+class PicturePair:
+    """Two pictures without noise. `tolerance` (H, W) bounds their difference, pixel by pixel."""
+
+    a: Pixels
+    b: Pixels
+    tolerance: Float
+    grazing: Mask
+
+    def __post_init__(self) -> None:
+        if self.a.shape != self.b.shape:
+            raise Unmeasurable(f"pictures differ in size: {self.a.shape} and {self.b.shape}")
+        if not (np.isfinite(self.a).all() and np.isfinite(self.b).all()):
+            raise Unmeasurable("a picture holds values that are not finite")
+
+    @cached_property
+    def difference(self) -> Float:
+        """(H, W)."""
+        return images.difference(self.a, self.b)
+
+    @property
+    def data_range(self) -> float:
+        """The brightest value of either picture; SSIM and PSNR are relative to it."""
+        return float(max(self.a.max(), self.b.max()))
+
+    def compare(self, observable: Observable) -> Comparison:
+        """Raises Unmeasurable for observables that are none of pictures."""
+        keep = ~self.grazing
+        crowded = ""
+        if self.grazing.mean() > MOST_GRAZING:
+            crowded = (
+                f"{self.grazing.mean():.1%} of the pixels graze an edge, too many to leave out"
+            )
+        match observable:
+            case Observable.SSIM:
+                value = images.ssim(self.a, self.b, self.data_range)
+                detail = self._counts() | {"data_range": self.data_range}
+                return Comparison(
+                    value, 1.0, 1e-4, value >= 1 - 1e-4,
+                    "1e-4: what pictures without noise of analytic scenes must reach",
+                    crowded, detail,
+                )  # fmt: skip
+            case Observable.RMSE:
+                value = images.rmse(self.a, self.b, keep)
+                limit = float(np.sqrt(np.mean(self.tolerance[keep] ** 2)))
+                detail = self._counts()
+                psnr = images.psnr(self.a, self.b, keep, self.data_range)
+                detail["psnr_db"] = psnr if np.isfinite(psnr) else "infinite"
+                return Comparison(
+                    value, 0.0, limit, value <= limit, "root mean square of the pixels' tolerances",
+                    crowded, detail,
+                )  # fmt: skip
+            case Observable.MAX_DIFFERENCE:
+                return self._largest(keep, crowded)
+            case Observable.P999_DIFFERENCE:
+                value = float(np.quantile(self.difference[keep], 0.999))
+                limit = float(np.quantile(self.tolerance[keep], 0.999))
+                return Comparison(
+                    value, 0.0, limit, value <= limit, "the same percentile of the tolerances",
+                    crowded, self._counts(),
+                )  # fmt: skip
+            case Observable.DELTA_E:
+                value = float(images.delta_e(self.a, self.b)[keep].max())
+                limit = images.LAB_SLOPE * float(self.tolerance[keep].max())
+                return Comparison(
+                    value, 0.0, limit, value <= limit,
+                    "largest pixel tolerance x steepest slope of CIE Lab", crowded, self._counts(),
+                )  # fmt: skip
+        raise Unmeasurable(f"{observable} is not an observable of two pictures")
+
+    def _largest(self, keep: Mask, crowded: str) -> Comparison:
+        ratio = np.where(keep, self.difference / self.tolerance, -np.inf)
+        y, x = np.unravel_index(int(ratio.argmax()), ratio.shape)
+        return Comparison(
+            float(self.difference[y, x]), 0.0, float(self.tolerance[y, x]),
+            bool(ratio[y, x] <= 1),
+            "quanta of both pictures + light cut by weight + change of the pixel when the camera "
+            "moves by the renderers' geometric error",
+            crowded,
+            self._counts()
+            | {"max": float(self.difference[keep].max()), "worst_pixel_x": int(x),
+               "worst_pixel_y": int(y)},
+        )  # fmt: skip
+
+    def _counts(self) -> dict[str, float | int | str]:
+        grazing = self.difference[self.grazing]
+        return {
+            "grazing_pixels": int(self.grazing.sum()),
+            "grazing_share": float(self.grazing.mean()),
+            "max_at_grazing": float(grazing.max()) if grazing.size else 0.0,
+            "max_difference": float(self.difference[~self.grazing].max()),
+        }
+
+
+@dataclass(frozen=True)
+class SampledPicture:
+    """A picture by a renderer that samples, twice with independent seeds, and what it estimates.
+
+    `reference` is the mean over each pixel's area of a picture without noise, and `center` the same
+    picture at pixel centres.
+    """
+
+    first: Pixels
+    second: Pixels
+    reference: Pixels
+    center: Pixels
+
+    def compare(self, observable: Observable) -> Comparison | None:
+        """None for observables that noise leaves without a bound."""
+        if not all(np.isfinite(p).all() for p in (self.first, self.second)):
+            raise Unmeasurable("a picture holds values that are not finite")
+        everything = np.ones(self.first.shape[:2], bool)
+        data_range = float(max(self.first.max(), self.reference.max()))
+        match observable:
+            case Observable.SSIM:
+                value = images.ssim(self.first, self.reference, data_range)
+                own = images.ssim(self.first, self.second, data_range)
+                return Comparison(
+                    value, 1.0, 1 - own, value >= own,
+                    "its own sampling error: two seeds of it agree no better",
+                    detail={"ssim_of_two_seeds": own},
+                )  # fmt: skip
+            case Observable.RMSE:
+                value = images.rmse(self.first, self.reference, everything)
+                own = images.rmse(self.first, self.second, everything) / np.sqrt(2)
+                # A mean over n x n regular samples errs by order 1/n at an edge: the step from 1
+                # to 4 samples a side is 3/4 of the first error, of which 1/4 is left.
+                left = images.rmse(self.center, self.reference, everything) / 3
+                # The variance of N pixels is known to sqrt(2 / N) of itself, times the kurtosis
+                # of a lobe-sampled pixel, of order 10; five standard errors of that.
+                spread = 1 + 5 * np.sqrt(2 * 10 / self.first.size) / 2
+                limit = float(np.hypot(own * spread, left))
+                return Comparison(
+                    value, 0.0, limit, value <= limit,
+                    "its own sampling error, from two seeds, and the error of the area means",
+                    detail={"own_sampling_rmse": float(own), "reference_rmse": float(left)},
+                )  # fmt: skip
+        return None

@@ -1,0 +1,117 @@
+"""Checks of renderers against each other: the same picture, twice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from harness import plan
+from harness.errors import SnellcheckError
+from harness.expected import Float
+from harness.measure.comparison import Unmeasurable
+from harness.measure.images import Pixels, box_downsample
+from harness.measure.observables import Observable
+from harness.measure.pictures import (
+    GRAZING,
+    PicturePair,
+    SampledPicture,
+    geometric_error,
+    sensitivity,
+)
+from harness.preflight import FLOAT32
+from harness.record import Check, Verdict
+from harness.results import Contender, NotAvailable, Results
+from harness.scene import model
+from harness.scene.resolved import ResolvedScene
+from harness.verdict import judge, unmeasured
+
+
+def camera_shift(scene: ResolvedScene) -> float:
+    """How far a float32 renderer's ray may stray in `scene`, units: two interfaces, then a face."""
+    points = [np.abs(scene.camera.origin).max()]
+    for surface in scene.surfaces:
+        shape = surface.shape
+        frame = getattr(shape, "frame", None)
+        points.append(np.abs(frame.origin if frame else getattr(shape, "center", (1.0,))).max())
+    return geometric_error(float(max(points)), 2, FLOAT32)
+
+
+class PairJudge:
+    """Compares pictures of one case; what every pair shares is computed once."""
+
+    def __init__(self, scene: ResolvedScene, results: Results, helper: str) -> None:
+        self._scene, self._results, self._helper = scene, results, helper
+        self._made: dict[tuple[str, str], PicturePair] = {}
+
+    def checks(self, spec: model.CheckSpec, contenders: list[Contender]) -> Iterator[Check]:
+        """All pairs without noise, and each sampling renderer against the helper's area means."""
+        ready = []
+        for contender in contenders:
+            try:
+                self._results.picture(contender, plan.IMAGE)
+                ready.append(contender)
+            except NotAvailable as gap:
+                yield unmeasured(spec, contender.name, spec.against, gap.status, gap.reason)
+        exact = [c for c in ready if not c.ready().noisy]
+        if len(exact) < 2:
+            for contender in exact:
+                reason = "no other renderer without noise shows this picture"
+                yield unmeasured(spec, contender.name, spec.against, Verdict.SKIP, reason)
+        for a, b in combinations(exact, 2):
+            if spec.against in ("renderers", a.name, b.name):
+                first, second = (b, a) if spec.against == a.name else (a, b)
+                yield self._exact(spec, first, second)
+        for contender in ready:
+            if contender.ready().noisy:
+                yield from self._sampled(spec, contender)
+
+    def _exact(self, spec: model.CheckSpec, a: Contender, b: Contender) -> Check:
+        try:
+            comparison = self._pair(a, b).compare(Observable(spec.observable))
+        except (NotAvailable, Unmeasurable, SnellcheckError) as error:
+            return unmeasured(spec, a.name, b.name, Verdict.ERROR, str(error))
+        return judge(spec, a.name, b.name, comparison)
+
+    def _sampled(self, spec: model.CheckSpec, contender: Contender) -> Iterator[Check]:
+        try:
+            comparison = SampledPicture(
+                self._results.picture(contender, plan.IMAGE),
+                self._results.picture(contender, plan.SECOND_IMAGE),
+                self._area, self._base,
+            ).compare(Observable(spec.observable))  # fmt: skip
+        except NotAvailable as gap:
+            yield unmeasured(spec, contender.name, self._helper, gap.status, gap.reason)
+        except Unmeasurable as error:
+            yield unmeasured(spec, contender.name, self._helper, Verdict.ERROR, str(error))
+        else:
+            if comparison is not None:
+                yield judge(spec, contender.name, self._helper, comparison)
+
+    def _pair(self, a: Contender, b: Contender) -> PicturePair:
+        key = (a.name, b.name)
+        if key not in self._made:
+            change = self._sensitivity
+            cut = 2 * self._scene.transport.min_weight * self._scene.transport.max_depth
+            floor = a.ready().quantum + b.ready().quantum + cut
+            self._made[key] = PicturePair(
+                self._results.picture(a, plan.IMAGE), self._results.picture(b, plan.IMAGE),
+                floor + change, change > GRAZING,
+            )  # fmt: skip
+        return self._made[key]
+
+    @cached_property
+    def _base(self) -> Pixels:
+        return self._results.auxiliary(self._helper, plan.BASE_IMAGE)
+
+    @cached_property
+    def _area(self) -> Pixels:
+        fine = self._results.auxiliary(self._helper, plan.AREA_IMAGE)
+        return box_downsample(fine, plan.AREA_FACTOR)
+
+    @cached_property
+    def _sensitivity(self) -> Float:
+        shifted = [self._results.auxiliary(self._helper, role) for role in plan.SHIFTED]
+        return sensitivity(self._base, shifted)

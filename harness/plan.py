@@ -1,0 +1,170 @@
+"""What has to be rendered for a case: pure jobs, from which the judge takes its measurements.
+
+A job is everything that determines a result and nothing else; its role is the name under which the
+judge finds the result again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from harness.measure.observables import IMAGE_OBSERVABLES, Observable
+from harness.preflight import Preflight
+from harness.probe.scenes import AXES, code_scene, light_scene
+from harness.renderers.base import Capability, RenderSettings
+from harness.scene import model
+from harness.scene.load import LoadedCase
+from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve
+from harness.scene.resolved import Film, Rectangle, ResolvedScene
+
+IMAGE = "image"
+# How a probe looks: coarse codes, for people; nothing is measured on it.
+VIEW = "view"
+VIEW_CELLS = 8
+SECOND_IMAGE = "image, second seed"
+BASE_IMAGE = "unshifted"
+AREA_IMAGE = "area"
+SHIFTED = ("shifted left", "shifted right", "shifted up", "shifted down")
+# Samples per pixel side of the image that is averaged over pixel areas.
+AREA_FACTOR = 4
+
+
+@dataclass(frozen=True)
+class Job:
+    """One render of `scene`, or with `path` one trace of its camera's rays along that path."""
+
+    renderer: str
+    role: str
+    scene: ResolvedScene
+    settings: RenderSettings
+    path: str | None = None
+
+
+@dataclass(frozen=True)
+class PreparedCase:
+    """A case with its resolved scene."""
+
+    loaded: LoadedCase
+    scene: ResolvedScene
+
+    @property
+    def wants_images(self) -> bool:
+        """Whether any check looks at pictures."""
+        return any(Observable(c.observable) in IMAGE_OBSERVABLES for c in self.loaded.model.checks)
+
+    @property
+    def compares_images(self) -> bool:
+        """Whether any check compares the pictures of two renderers."""
+        return any(c.against != "truth" for c in self.loaded.model.checks)
+
+    def probe(self, name: str | None) -> model.Probe:
+        """The probe of that name, or the first one."""
+        probes = self.loaded.model.probes
+        return next((p for p in probes if p.name == name), probes[0])
+
+    def planes(self, probe: model.Probe) -> tuple[Rectangle, ...]:
+        """The rectangles on which the probe's rays are caught."""
+        return probe_planes(probe)
+
+
+def prepare(loaded: LoadedCase) -> PreparedCase:
+    """Resolves the scene. Raises InputError where it cannot be."""
+    return PreparedCase(loaded, resolve(loaded))
+
+
+def scene_for(scene: ResolvedScene, capabilities: Collection[Capability]) -> ResolvedScene:
+    """`scene` as a renderer can take it: without thin faces, a real slab stands in their place."""
+    return scene if Capability.THIN_SLAB in capabilities else expand_thin_slabs(scene)
+
+
+def jobs_of(
+    case: PreparedCase,
+    renderer: str,
+    capabilities: Collection[Capability],
+    preflight: Preflight,
+    settings: RenderSettings,
+) -> list[Job]:
+    """All jobs that `renderer` must do for `case`."""
+    scene = scene_for(case.scene, capabilities)
+    jobs = []
+    if case.wants_images:
+        jobs.append(Job(renderer, IMAGE, scene, settings))
+        if preflight.noisy:
+            other = replace(settings, seed=settings.seed + 1)
+            jobs.append(Job(renderer, SECOND_IMAGE, scene, other))
+    for probe in case.loaded.model.probes:
+        planes = case.planes(probe)
+        jobs += _probe_jobs(scene, probe, planes, renderer, capabilities, preflight, settings)
+    if not case.wants_images:
+        probe = case.probe(None)
+        view = code_scene(scene, case.planes(probe)[0], AXES[0], VIEW_CELLS, probe.path)
+        jobs.append(Job(renderer, VIEW, view, settings))
+    return jobs
+
+
+def _probe_jobs(
+    scene: ResolvedScene,
+    probe: model.Probe,
+    planes: tuple[Rectangle, ...],
+    renderer: str,
+    capabilities: Collection[Capability],
+    preflight: Preflight,
+    settings: RenderSettings,
+) -> list[Job]:
+    if probe.measure == "light":
+        light = light_scene(scene, planes[0], probe.path)
+        return [Job(renderer, light_role(probe), light, settings)]
+    if Capability.RAYS in capabilities:
+        coded = code_scene(scene, planes[0], AXES[0], 1, probe.path)
+        return [Job(renderer, trace_role(probe), coded, settings, probe.path)]
+    cells = min(preflight.cells, probe.cells)
+    return [
+        Job(
+            renderer, code_role(probe, index, axis),
+            code_scene(scene, plane, axis, cells, probe.path), settings,
+        )
+        for index, plane in enumerate(planes)
+        for axis in AXES
+    ]  # fmt: skip
+
+
+def auxiliary_jobs(
+    case: PreparedCase, helper: str, shift: float, area: bool, settings: RenderSettings
+) -> list[Job]:
+    """Renders that say how sensitive a picture is: shifted by `shift` units, and area-averaged.
+
+    They are made by `helper`, a renderer without noise that is always there.
+    """
+    if not case.compares_images:
+        return []
+    jobs = [Job(helper, BASE_IMAGE, case.scene, settings)]
+    jobs += [
+        Job(helper, role, shifted(case.scene, dx * shift, dy * shift), settings)
+        for role, (dx, dy) in zip(SHIFTED, ((-1, 0), (1, 0), (0, 1), (0, -1)), strict=True)
+    ]
+    if area:
+        film = case.scene.film
+        fine = Film(width=film.width * AREA_FACTOR, height=film.height * AREA_FACTOR)
+        jobs.append(Job(helper, AREA_IMAGE, case.scene.model_copy(update={"film": fine}), settings))
+    return jobs
+
+
+def shifted(scene: ResolvedScene, dx: float, dy: float) -> ResolvedScene:
+    """The scene with its camera moved sideways by (dx, dy) units along its right and up."""
+    camera = scene.camera
+    axes = zip(camera.origin, camera.right, camera.up, strict=True)
+    origin = tuple(o + dx * r + dy * u for o, r, u in axes)
+    return scene.model_copy(update={"camera": camera.model_copy(update={"origin": origin})})
+
+
+def light_role(probe: model.Probe) -> str:
+    return f"{probe.name}: light"
+
+
+def trace_role(probe: model.Probe) -> str:
+    return f"{probe.name}: rays"
+
+
+def code_role(probe: model.Probe, plane: int, axis: str) -> str:
+    return f"{probe.name}: plane {plane} {axis}"

@@ -1,0 +1,78 @@
+"""What the judge is given: the renderers of the run and what their jobs delivered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from harness.errors import RendererError, RendererFailed
+from harness.measure.images import Pixels
+from harness.preflight import Preflight
+from harness.record import Verdict
+from harness.renderers.base import Capability, Image, RayPaths
+
+Result = Image | RayPaths | RendererError
+
+
+class NotAvailable(Exception):
+    """A result that a check needs is not there; the check becomes SKIP or ERROR."""
+
+    def __init__(self, status: Verdict, reason: str) -> None:
+        super().__init__(reason)
+        self.status, self.reason = status, reason
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A renderer as the judge sees it. `absent` is SKIP or ERROR with `reason` where it is out."""
+
+    name: str
+    version: str
+    capabilities: frozenset[Capability]
+    preflight: Preflight | None
+    absent: Verdict | None = None
+    reason: str = ""
+
+    def ready(self) -> Preflight:
+        """Its calibration. Raises NotAvailable where it is out."""
+        if self.absent is not None or self.preflight is None:
+            raise NotAvailable(self.absent or Verdict.ERROR, self.reason or "no preflight")
+        return self.preflight
+
+
+@dataclass(frozen=True)
+class Results:
+    """Results of one case by (renderer, role), all pictures `width` x `height`."""
+
+    by_role: Mapping[tuple[str, str], Result]
+    width: int
+    height: int
+
+    def get(self, contender: Contender, role: str) -> Image | RayPaths:
+        """Raises NotAvailable where the renderer is out or did not deliver."""
+        contender.ready()
+        return self.of(contender.name, role)
+
+    def of(self, renderer: str, role: str) -> Image | RayPaths:
+        """Raises NotAvailable where there is no such result."""
+        result = self.by_role.get((renderer, role))
+        if result is None:
+            raise NotAvailable(Verdict.ERROR, f"'{role}' was not rendered by {renderer}")
+        if isinstance(result, RendererError):
+            failed = isinstance(result, RendererFailed)
+            raise NotAvailable(Verdict.ERROR if failed else Verdict.SKIP, str(result))
+        return result
+
+    def picture(self, contender: Contender, role: str) -> Pixels:
+        """The pixels of an image of the case's own size."""
+        image = self.get(contender, role)
+        if not isinstance(image, Image) or image.pixels.shape != (self.height, self.width, 3):
+            raise NotAvailable(Verdict.ERROR, f"'{role}' is no image of the film's size")
+        return image.pixels
+
+    def auxiliary(self, helper: str, role: str) -> Pixels:
+        """The pixels of a helper's image, of whatever size."""
+        image = self.of(helper, role)
+        if not isinstance(image, Image):
+            raise NotAvailable(Verdict.ERROR, f"'{role}' is no image")
+        return image.pixels
