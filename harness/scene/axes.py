@@ -179,9 +179,7 @@ def _steps(exact: dict[str, Fraction], path: KeyPath) -> tuple[Fraction, Fractio
             )
         count = Fraction((stop - start) // step + 1)
     if count > MOST_COMBINATIONS:
-        raise SceneInvalid(
-            Finding(path, f"{int(count):.6g} values", None, f"≤ {MOST_COMBINATIONS}")
-        )
+        raise SceneInvalid(Finding(path, f"more than {MOST_COMBINATIONS} values"))
     return start, step, int(count)
 
 

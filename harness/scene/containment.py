@@ -193,7 +193,7 @@ def _cylinder_samples(shape: resolved.Cylinder) -> Points:
     across = np.outer(np.cos(turn), shape.frame.x) + np.outer(np.sin(turn), shape.frame.y)
     axis = np.array(shape.frame.z) * shape.height / 2
     rings = [shape.radius * across + level * axis for level in np.linspace(-1, 1, 9)]
-    return np.concatenate([*rings, [axis, -axis]]) + np.array(shape.frame.origin)
+    return np.asarray(np.concatenate([*rings, [axis, -axis]]) + shape.frame.origin)
 
 
 # --- crossings of surfaces ------------------------------------------------------------------------

@@ -137,6 +137,7 @@ class _Evaluation:
         """None where the expression has no value; why is then among the findings."""
         try:
             expression = self.calculator.parse(text)
+            expression.check_names(self.names.keys() | self.broken)
             if expression.names & self.broken:
                 return None
             return self.calculator.value(expression, self.names)

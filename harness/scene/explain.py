@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Schema = Mapping[str, Any]
 
+UNKNOWN_KEY = "unknown key"
+MISSING = "missing"
 WRONG_TYPE = {
     "float_type": "a number",
     "int_type": "an integer",
@@ -42,9 +44,12 @@ BOUNDS = {
 
 
 def findings_of(error: ValidationError, document: dict[str, object]) -> list[Finding]:
-    """One finding per error of `Case`, without repetitions."""
+    """One finding per error of `Case`, without repetitions and without what follows from others."""
     details = [d for d in error.errors(include_url=False) if not _is_consequence(d)]
-    return list(dict.fromkeys(_finding(detail, document) for detail in details))
+    findings = list(dict.fromkeys(_finding(detail, document) for detail in details))
+    # A key that is misspelt is not missing on top.
+    misspelt = {(*f.path[:-1], f.suggestion) for f in findings if f.message == UNKNOWN_KEY}
+    return [f for f in findings if f.message != MISSING or f.path not in misspelt]
 
 
 def _is_consequence(detail: ErrorDetails) -> bool:
@@ -61,16 +66,17 @@ def _finding(detail: ErrorDetails, document: dict[str, object]) -> Finding:
         return _unknown_key(path, schema)
     if kind == "missing":
         if isinstance(path[-1], int):  # an array with too few elements
-            return _wrong_length(path[:-1], detail["input"], document)
-        return Finding(path, "missing", None, expectation(_child(schema, path[-1])))
+            path, schema = _located(detail["loc"][:-1], document)
+            return _wrong_length(path, detail["input"], schema)
+        return Finding(path, MISSING, None, expectation(_child(schema, path[-1])))
     if kind == "union_tag_not_found":
-        return Finding((*path, "type"), "missing", None, _alternatives(_tags(schema)))
+        return Finding((*path, "type"), MISSING, None, _alternatives(_tags(schema)))
     if kind == "union_tag_invalid":
         return _unknown_word((*path, "type"), context["tag"], _tags(schema))
     if kind == "literal_error":
         return _unknown_word(path, detail["input"], _words(schema, str(context["expected"])))
     if kind in ("too_short", "too_long"):
-        return _wrong_length(path, detail["input"], document)
+        return _wrong_length(path, detail["input"], schema)
     if kind in BOUNDS:
         key, sign = BOUNDS[kind]
         return Finding(path, "out of range", value, f"{sign} {context[key]:g}")
@@ -88,7 +94,7 @@ def _finding(detail: ErrorDetails, document: dict[str, object]) -> Finding:
 def _unknown_key(path: KeyPath, schema: Schema) -> Finding:
     known = sorted(schema.get("properties", {}))
     key = str(path[-1])
-    return Finding(path, "unknown key", None, _alternatives(known) or None, nearest(key, known))
+    return Finding(path, UNKNOWN_KEY, None, _alternatives(known) or None, nearest(key, known))
 
 
 def _unknown_word(path: KeyPath, value: object, known: list[str]) -> Finding:
@@ -101,8 +107,7 @@ def _unknown_word(path: KeyPath, value: object, known: list[str]) -> Finding:
     )
 
 
-def _wrong_length(path: KeyPath, value: object, document: dict[str, object]) -> Finding:
-    _, schema = _located(path, document)
+def _wrong_length(path: KeyPath, value: object, schema: Schema) -> Finding:
     count = len(value) if isinstance(value, tuple | str) else 0
     return Finding(path, f"{count} elements", quoted(value), expectation(schema))
 

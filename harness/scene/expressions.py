@@ -9,7 +9,7 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeGuard
 
@@ -69,6 +69,11 @@ class Expression:
     text: str
     tree: ast.expr
     names: frozenset[str]
+
+    def check_names(self, known: Collection[str]) -> None:
+        """Raises ExpressionError for a name that is not among the known ones."""
+        for name in sorted(self.names.difference(known)):
+            raise ExpressionError(f"unknown name {name}", nearest(name, [*known, *FUNCTIONS]))
 
 
 def is_expression(value: object) -> TypeGuard[str]:
@@ -159,8 +164,7 @@ class Calculator:
 
         Raises ExpressionError.
         """
-        for name in sorted(expression.names - names.keys()):
-            raise ExpressionError(f"unknown name {name}", nearest(name, [*names, *FUNCTIONS]))
+        expression.check_names(names)
         if isinstance(expression.tree, ast.Name):
             named = names[expression.tree.id]
             if isinstance(named, str):

@@ -13,10 +13,10 @@ from pydantic import ValidationError
 from harness.errors import InputError, Problem, nearest
 from harness.scene.crosscheck import cross_findings
 from harness.scene.document import parse_document, read_source, value_at
-from harness.scene.expand import Permutation, expand
+from harness.scene.expand import PROSE, Permutation, expand
 from harness.scene.explain import findings_of
 from harness.scene.expressions import Value, is_expression
-from harness.scene.findings import Finding, problems, quoted
+from harness.scene.findings import Finding, KeyPath, problems, quoted
 from harness.scene.model import Case
 
 Quality = Literal["draft", "normal", "high"]
@@ -107,8 +107,12 @@ def _validate(
     return model, [
         _shown_with_origin(finding, permutation, document)
         for finding in found
-        if not is_expression(value_at(data, finding.path))
+        if not _stands_for_a_value(finding.path, data)
     ]
+
+
+def _stands_for_a_value(path: KeyPath, document: dict[str, object]) -> bool:
+    return is_expression(value_at(document, path)) and PROSE.isdisjoint(path)
 
 
 def _shown_with_origin(
