@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import subprocess
+import sys
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -95,15 +97,49 @@ def test_locks_hold_what_the_project_asks_for() -> None:
         versions: dict[str, list[Version]] = {}
         for requirement, _ in locked(name):
             (specifier,) = requirement.specifier
-            versions.setdefault(canonical(requirement), []).append(Version(specifier.version))
+            versions.setdefault(canonical(requirement.name), []).append(Version(specifier.version))
         for requirement in map(Requirement, wanted):
-            held = versions.get(canonical(requirement))
+            held = versions.get(canonical(requirement.name))
             assert held, f"{requirement.name} is not in {name}.txt: run `make lock`"
             assert all(requirement.specifier.contains(v) for v in held), requirement
 
 
-def canonical(requirement: Requirement) -> str:
-    return re.sub(r"[-_.]+", "-", requirement.name).lower()
+def canonical(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+# Imported under a name that is not the distribution's, or brought along by one that pins it.
+DISTRIBUTIONS = {
+    "colour": "colour-science",
+    "drjit": "mitsuba",
+    "pydantic_core": "pydantic",
+    "skimage": "scikit-image",
+}
+
+
+def test_what_is_imported_is_asked_for_and_what_is_asked_for_is_imported() -> None:
+    own = {"harness", "tracer", *sys.stdlib_module_names}
+    imported = {
+        canonical(DISTRIBUTIONS.get(module, module))
+        for package in ("harness", "tracer")
+        for path in (ROOT / package).rglob("*.py")
+        for module in imported_modules(path.read_text(encoding="utf-8"))
+        if module not in own
+    }
+    data = project()["project"]
+    wanted = data["dependencies"] + data["optional-dependencies"]["mitsuba"]
+    assert imported == {canonical(Requirement(text).name) for text in wanted}
+
+
+def imported_modules(source: str) -> set[str]:
+    """Top-level names of all modules that a source imports, wherever in it."""
+    modules = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name.partition(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            modules.add(node.module.partition(".")[0])
+    return modules
 
 
 def test_the_entry_points_are_those_that_third_parties_use() -> None:
