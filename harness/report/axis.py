@@ -9,6 +9,12 @@ from dataclasses import dataclass
 from harness.report.quantity import SUPERSCRIPT, number
 
 TICK_ROOM = 13.0  # pixels
+LARGEST = 1e300  # beyond it, differences of values overflow
+
+
+def drawable(value: float) -> bool:
+    """Finite, and small enough to be placed on an axis."""
+    return abs(value) < LARGEST  # NaN is not less
 
 
 @dataclass(frozen=True)
@@ -82,10 +88,10 @@ def _round_step(rough: float) -> float:
 
 
 def spanning(values: Sequence[float], start: float, end: float, margin: float = 0.04) -> Axis:
-    """A linear axis that holds all of `values` (finite, at least one) with a margin."""
+    """A linear axis that holds all of `values` (drawable, at least one) with a margin."""
     low, high = min(values), max(values)
     room = (high - low) * margin
-    if not room > 1e-12 * max(abs(low), abs(high)):  # a constant, or as good as one
+    if not high - low > 1e-12 * max(abs(low), abs(high)):  # a constant, or as good as one
         room = abs(high) * 0.1 or 1.0
     return Axis(low - room, high + room, start, end)
 
@@ -93,7 +99,7 @@ def spanning(values: Sequence[float], start: float, end: float, margin: float = 
 def for_residuals(residuals: Sequence[float], band: float, start: float, end: float) -> Axis:
     """A symmetric axis on which both the band ±`band` and residuals far outside it can be read."""
     largest = max((abs(v) for v in residuals), default=0.0)
-    if band > 0 and largest > 4 * band:
+    if 4 * band < largest < 1e30 * band:
         return Axis(-1.5 * largest, 1.5 * largest, start, end, linear_to=band)
     high = max(1.1 * largest, 1.4 * band) or 1.0
     return Axis(-high, high, start, end)

@@ -1,6 +1,6 @@
 """Curves with their residuals as inline SVG: no script, colours and text left to the stylesheet.
 
-Why not matplotlib: docs/decisions/charts-are-own-svg.md.
+Why not matplotlib: docs/decisions/0004-charts-are-our-own-svg.md.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from harness.record import Curve, Series
-from harness.report.axis import Axis, for_residuals, spanning
+from harness.report.axis import Axis, drawable, for_residuals, spanning
 from harness.report.links import clean
 from harness.report.quantity import number, share
 
@@ -63,7 +63,7 @@ def draw(curve: Curve, colours: Mapping[str, str]) -> Chart:
     """The chart of `curve`; `colours` gives each renderer its stylesheet class."""
     residuals = [s for s in curve.residuals if s.x]
     bottom = RESIDUAL_END if residuals else MAIN_END
-    xs = [x for s in (*curve.series, *residuals) for x in s.x if math.isfinite(x)]
+    xs = [x for s in (*curve.series, *residuals) for x in s.x if drawable(x)]
     x_axis = spanning(xs or [0.0, 1.0], LEFT, RIGHT, 0.02)
     parts = [_panel(curve, x_axis, colours, labelled=not residuals)]
     bent = False
@@ -85,23 +85,25 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
     if residual is None:
         return None
     width, height = 84, 48
-    xs = [x for x in residual.x if math.isfinite(x)]
+    xs = [x for x in residual.x if drawable(x)]
     x_axis = spanning(xs or [0.0, 1.0], 1, width - 1, 0.0)
-    band = max((t for t in curve.tolerance if math.isfinite(t)), default=0.0)
-    values = [y for y in residual.y if math.isfinite(y)]
+    band = max((t for t in curve.tolerance if drawable(t)), default=0.0)
+    values = [y for y in residual.y if drawable(y)]
     y_axis = for_residuals(values, band, height - 1, 1)
     points = list(zip(residual.x, residual.y, strict=False))
-    placed = [[(x_axis.place(x), y_axis.place(y)) for x, y in r] for r in _finite_runs(points)]
+    runs = [_thinned(run, width // 2) for run in _finite_runs(points)]
+    placed = [[(x_axis.place(x), y_axis.place(y)) for x, y in run] for run in runs]
+    few = slice(None, None, max(1, len(residual.x) // 8))
     return Markup(
         '<svg class="spark {}" viewBox="0 0 {} {}" role="img" aria-label="{}">'
-        '{}<path class="line" d="{}"/></svg>'
+        '<path class="band" d="{}"/><path class="line" d="{}"/></svg>'
     ).format(
         colours.get(renderer, "c7"),
         width,
         height,
         f"residuals of {clean(renderer)}",
-        _band(residual.x, curve.tolerance, x_axis, y_axis),
-        "".join(_path(_thinned(run, 120)) for run in placed),
+        _band_outline(residual.x[few], curve.tolerance[few], x_axis, y_axis),
+        "".join(map(_path, placed)),
     )
 
 
@@ -141,8 +143,8 @@ def _residual_panel(
 
 def _value_axis(series: Sequence[Series]) -> Axis:
     """Holds the truth wholly and what is near it; what is far off is put on the edge."""
-    truth = [y for s in series if s.renderer == "truth" for y in s.y if math.isfinite(y)]
-    values = [y for s in series for y in s.y if math.isfinite(y)]
+    truth = [y for s in series if s.renderer == "truth" for y in s.y if drawable(y)]
+    values = [y for s in series for y in s.y if drawable(y)]
     if truth:
         reach = 2 * (max(truth) - min(truth)) or math.inf
         low, high = min(truth) - reach, max(truth) + reach
@@ -151,8 +153,8 @@ def _value_axis(series: Sequence[Series]) -> Axis:
 
 
 def _residual_axis(curve: Curve, residuals: Sequence[Series]) -> Axis:
-    values = [y for s in residuals for y in s.y if math.isfinite(y)]
-    band = max((t for t in curve.tolerance if math.isfinite(t)), default=0.0)
+    values = [y for s in residuals for y in s.y if drawable(y)]
+    band = max((t for t in curve.tolerance if drawable(t)), default=0.0)
     return for_residuals(values, band, RESIDUAL_END, RESIDUAL_START)
 
 
@@ -178,15 +180,19 @@ def _frame(x_axis: Axis, y_axis: Axis, y_label: str, x_label: str) -> Markup:
 
 
 def _band(xs: Sequence[float], tolerance: Sequence[float], x_axis: Axis, y_axis: Axis) -> Markup:
+    outline = _band_outline(xs, tolerance, x_axis, y_axis)
+    return Markup('<path class="band" d="{}"/>').format(outline) if outline else Markup("")
+
+
+def _band_outline(
+    xs: Sequence[float], tolerance: Sequence[float], x_axis: Axis, y_axis: Axis
+) -> str:
+    """There along the upper edge, back along the lower."""
     pairs = zip(xs, tolerance, strict=False)
-    known = [(x, t) for x, t in pairs if math.isfinite(x) and math.isfinite(t)]
-    if not known:
-        return Markup("")
+    known = [(x, t) for x, t in pairs if drawable(x) and drawable(t)]
     upper = [(x_axis.place(x), y_axis.place(t)) for x, t in known]
     lower = [(x_axis.place(x), y_axis.place(-t)) for x, t in reversed(known)]
-    outline = "L".join(f"{x:.1f} {y:.1f}" for x, y in upper + lower)
-    edges = "".join(_path(side) for side in (upper, lower))
-    return Markup('<path class="band" d="M{}z"/><path class="edge" d="{}"/>').format(outline, edges)
+    return _path(upper + lower) + "z" if known else ""
 
 
 # --- lines ----------------------------------------------------------------------------------------
@@ -206,7 +212,7 @@ def _line(
     parts = [Markup('<path class="line" d="{}"/>').format("".join(map(_path, placed)))]
     if colour in SHAPES:
         parts += _marks(series, points, (x_axis, y_axis), SHAPES[colour], phase)
-    lost = [x for x, y in points if math.isfinite(x) and not math.isfinite(y)]
+    lost = [x for x, y in points if drawable(x) and not drawable(y)]
     if lost:
         cross = "m-3-3 6 6m-6 0 6-6"
         at = f"{y_axis.start - 6:.1f}"
@@ -225,7 +231,7 @@ def _marks(
     chosen = {min(len(points) - 1, int((k + phase) * every)) for k in range(count)}
     for k in sorted(chosen):
         x, y = points[k]
-        if not (math.isfinite(x) and math.isfinite(y)):
+        if not (drawable(x) and drawable(y)):
             continue
         beyond = "" if y_axis.holds(y) else " (beyond the axis)"
         yield Markup('<path class="mark" d="M{:.1f} {:.1f}{}"><title>{}</title></path>').format(
@@ -239,7 +245,7 @@ def _marks(
 def _finite_runs(points: Sequence[Point]) -> list[list[Point]]:
     runs: list[list[Point]] = [[]]
     for x, y in points:
-        if math.isfinite(x) and math.isfinite(y):
+        if drawable(x) and drawable(y):
             runs[-1].append((x, y))
         elif runs[-1]:
             runs.append([])
@@ -271,7 +277,7 @@ def _path(points: Sequence[Point]) -> str:
 def _entry(series: Series, curve: Curve, colours: Mapping[str, str]) -> Entry:
     residual = next((r for r in curve.residuals if r.renderer == series.renderer), None)
     worst, used = _worst(residual, curve.tolerance) if residual else (None, None)
-    lost = sum(not math.isfinite(y) for y in series.y)
+    lost = sum(not drawable(y) for y in series.y)
     colour = colours.get(series.renderer, "c7")
     return Entry(
         name=clean(series.renderer),
@@ -286,7 +292,7 @@ def _entry(series: Series, curve: Curve, colours: Mapping[str, str]) -> Entry:
 
 def _worst(residual: Series, tolerance: Sequence[float]) -> tuple[float | None, float | None]:
     """Largest |residual|, and the largest share of the tolerance at its own x; None if unknown."""
-    sizes = [abs(y) for y in residual.y if math.isfinite(y)]
+    sizes = [abs(y) for y in residual.y if drawable(y)]
     pairs = zip(residual.y, tolerance, strict=False)
-    shares = [abs(y) / t for y, t in pairs if math.isfinite(y) and t > 0]
+    shares = [abs(y) / t for y, t in pairs if drawable(y) and t > 0]
     return max(sizes, default=None), max(shares, default=None)

@@ -24,7 +24,7 @@ def clean(text: str) -> str:
 def page_name(case_id: str) -> str:
     """The file name of a case's page: different for different ids, also where case is ignored."""
     plain = re.sub(r"[^A-Za-z0-9._=,+\[\]-]", "_", case_id)[:120]
-    if plain == case_id.lower() and not plain.startswith((".", "-")):
+    if plain and plain == case_id.lower() and not plain.startswith((".", "-")):
         return f"{plain}.html"
     digest = hashlib.sha256(case_id.encode("utf-8", "surrogatepass")).hexdigest()[:8]
     return f"{plain.lstrip('.-') or 'case'}~{digest}.html"

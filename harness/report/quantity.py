@@ -61,7 +61,8 @@ def share(ratio: float | None) -> str:
     percent = 100 * ratio
     if percent == 0:
         return f"0{NARROW_SPACE}%"
-    return ("<0.01" if percent < 0.01 else _trim(f"{percent:.2g}")) + NARROW_SPACE + "%"
+    text = "<0.01" if percent < 0.01 else f"{percent:.0f}" if percent >= 10 else f"{percent:.2g}"
+    return f"{text}{NARROW_SPACE}%"
 
 
 def seconds(value: float) -> str:
