@@ -48,6 +48,7 @@ WORKER_ONLY = TRACER_ADAPTERS | {
     "harness.renderers.mitsuba_image",
     "harness.renderers.mitsuba_lobes",
     "harness.renderers.mitsuba_rays",
+    "harness.renderers.mitsuba_sensor",
 }
 
 # What makes `snellcheck --help` slow, or can abort the process, is imported where it is used.
