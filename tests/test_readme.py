@@ -1,0 +1,57 @@
+"""What the README shows works."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from harness.cli import main
+from harness.scene.load import load_cases
+
+README = (Path(__file__).resolve().parent.parent / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, flags=re.DOTALL | re.MULTILINE)
+
+
+def test_the_scene_that_it_shows_is_a_scene(tmp_path: Path) -> None:
+    (scene,) = blocks("toml")
+    path = tmp_path / "slab" / "offset.toml"
+    path.parent.mkdir()
+    path.write_text(scene, encoding="utf-8")
+    cases = load_cases(path, "draft")
+    assert [c.id for c in cases] == [
+        "slab-offset[thickness=0.25,ior=1.333]",
+        "slab-offset[thickness=0.25,ior=1.5]",
+        "slab-offset[thickness=1,ior=1.333]",
+        "slab-offset[thickness=1,ior=1.5]",
+    ]
+
+
+# At the start of a code span or of a line of a block.
+COMMANDS = sorted(
+    set(re.findall(r"(?:`|^)(?:\.venv/bin/)?snellcheck ([a-z]+)", README, re.MULTILINE))
+)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_commands_that_it_names_exist(command: str) -> None:
+    assert CliRunner().invoke(main, [command, "--help"]).exit_code == 0
+
+
+@pytest.mark.parametrize("option", sorted(set(re.findall(r"(?<=\s)--[a-z-]+", README))))
+def test_the_options_that_it_names_exist(option: str) -> None:
+    known = {o for command in main.commands.values() for p in command.params for o in p.opts}
+    assert option in known
+
+
+def test_the_cases_that_it_names_exist() -> None:
+    named = set(re.findall(r"'(slab-[^']+)'", README))
+    assert named
+    for case in named:
+        listed = CliRunner().invoke(main, ["list", case])
+        assert listed.exit_code == 0, listed.output
