@@ -105,8 +105,9 @@ def _mesh_planes(mesh: Mesh) -> Float:
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     planes = np.column_stack([n, np.einsum("ij,ij->i", n, a)])
     size = np.ptp(vertices, axis=0).max()
-    for rows in np.array_split(planes, max(1, len(planes) // 256)):
-        if (rows[:, :3] @ vertices.T - rows[:, 3:]).max() > 1e-12 * size:
+    for rows in np.array_split(planes, max(1, len(planes) // 1024)):
+        highest = (rows[:, :3] @ vertices.T).max(axis=1)
+        if (highest - rows[:, 3]).max() > 1e-12 * size:
             raise ValueError("the mesh is not convex")
     return planes
 

@@ -170,9 +170,7 @@ def show(case: str, quality: str, scenes: Path | None) -> None:
 @quality_option
 @scenes_option
 @reports_errors
-def translate(
-    case: str, target: str, out: Path | None, quality: str, scenes: Path | None
-) -> None:
+def translate(case: str, target: str, out: Path | None, quality: str, scenes: Path | None) -> None:
     """Write what a renderer is given for CASE, ready for its own command line."""
     from harness.archive import folder_name, scene_text
     from harness.plan import scene_for
@@ -267,5 +265,3 @@ def _renderers(
     own += [registry.configured_renderer(path) for path in configs]
     chosen = list(names) or sorted(registry.available())
     return [*(registry.create(name) for name in chosen), *own]
-
-

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -62,7 +63,9 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
     for case in summary.cases:
         by_family.setdefault(case.family, []).extend(case.checks)
     for family, checks in by_family.items():
-        table.add_row(escape(family), *(_cell([c for c in checks if c.renderer == n]) for n in names))
+        table.add_row(
+            escape(family), *(_cell([c for c in checks if c.renderer == n]) for n in names)
+        )
     console.print(table)
     for name, renderer in summary.renderers.items():
         if renderer.status != "ok":
@@ -105,7 +108,7 @@ def cases(loaded: Sequence[LoadedCase]) -> None:
     """A line per case, never folded or cut: scripts read it too."""
     width = max((len(case.id) for case in loaded), default=0)
     for case in loaded:
-        print(f"{case.id:<{width}}  {case.model.title}")
+        click.echo(f"{case.id:<{width}}  {case.model.title}")
 
 
 def case(prepared: PreparedCase) -> None:

@@ -26,7 +26,8 @@ class TruePaths:
     (m, 3) are the ray that leaves the last interface, in `medium` (m,). `weight` is the product of
     the Fresnel factors and `absorbed` (m, 3) the optical depth so far. Per interface k:
     `cos_theta_i` (m, letters), `interface` (m, letters, 3) and `n` (m, letters, 3) facing the ray.
-    `inside` (solids, m) says which solids the ray is in.
+    `inside` (solids, m) says which solids the ray is in, and `ahead` (m,) how far away the next
+    interface is; infinite where there is none.
     """
 
     status: NDArray[np.int8]
@@ -39,6 +40,7 @@ class TruePaths:
     interface: Float
     n: Float
     inside: NDArray[np.bool_]
+    ahead: Float
 
 
 @dataclass(frozen=True)
@@ -53,70 +55,79 @@ class Landing:
     transmission: Float
 
 
-def follow(scene: ResolvedScene, rays: Rays, path: str) -> TruePaths:
-    """Rays from the camera along `path`. Raises ValueError where there is no closed form."""
-    bodies = [Body(solid) for solid in scene.solids]
-    m, count = len(rays.origins), len(path)
-    rows = np.arange(m)
-    o, d = rays.origins.copy(), rays.directions.copy()
-    status = np.full(m, Status.HIT, np.int8)
-    weight, absorbed = np.ones(m), np.zeros((m, 3))
-    cos_i = np.full((m, count), np.nan)
-    interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
-    ior = np.array([medium.ior for medium in scene.media])
-    sigma = np.array([medium.absorption for medium in scene.media])
-    chords = [body.chord(o, d) for body in bodies]
-    inside = np.array([(c.t_in < 0) & (c.t_out > 0) for c in chords]).reshape(len(bodies), m)
-    medium = np.full(m, scene.camera.medium, np.intp)
+class ClosedForm:
+    """A scene prepared for exact tracing. Raises ValueError where it has no closed form."""
 
-    for k, letter in enumerate(path):
-        if k:
-            chords = [body.chord(o, d) for body in bodies]
-        t, n, which = _next_interface(chords, inside)
-        status[(status == Status.HIT) & ~np.isfinite(t)] = Status.MISS
-        live = status == Status.HIT
-        t = np.where(live, t, 0.0)
-        o = o + t[:, None] * d
-        absorbed += t[:, None] * sigma[medium]
-        facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
-        beyond = np.where(live, _beyond(bodies, which, inside[which, rows] if bodies else live), 0)
-        c = np.clip(-np.einsum("ij,ij->i", d, facing), 0, 1)
-        reflectance = fresnel(c, ior[medium], ior[beyond])
-        cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
-        if letter == "R":
-            weight *= np.where(live, reflectance, 1.0)
-            d = np.where(live[:, None], reflect(d, facing), d)
-            continue
-        bent, total = refract(d, facing, ior[medium], ior[beyond])
-        status[live & total] = Status.TIR
-        live &= ~total
-        weight *= np.where(live, 1 - reflectance, 1.0)
-        d = np.where(live[:, None], bent, d)
-        inside[which[live], np.flatnonzero(live)] ^= True
-        medium = np.where(live, beyond, medium)
-    return TruePaths(status, o, d, medium, weight, absorbed, cos_i, interface, normals, inside)
+    def __init__(self, scene: ResolvedScene) -> None:
+        self.scene = scene
+        self._bodies = [Body(solid) for solid in scene.solids]
 
+    def follow(self, rays: Rays, path: str) -> TruePaths:
+        """Rays from the camera along `path`."""
+        scene, bodies = self.scene, self._bodies
+        m, count = len(rays.origins), len(path)
+        rows = np.arange(m)
+        o, d = rays.origins.copy(), rays.directions.copy()
+        status = np.full(m, Status.HIT, np.int8)
+        weight, absorbed = np.ones(m), np.zeros((m, 3))
+        cos_i = np.full((m, count), np.nan)
+        interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
+        ior = np.array([medium.ior for medium in scene.media])
+        sigma = np.array([medium.absorption for medium in scene.media])
+        chords = [body.chord(o, d) for body in bodies]
+        inside = np.array([(c.t_in < 0) & (c.t_out > 0) for c in chords]).reshape(len(bodies), m)
+        medium = np.full(m, scene.camera.medium, np.intp)
 
-def land(scene: ResolvedScene, paths: TruePaths, plane: Rectangle) -> Landing:
-    """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
-    frame = plane.frame
-    o, d = paths.origin, paths.direction
-    status = paths.status.copy()
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = ((np.array(frame.origin) - o) @ np.array(frame.z)) / (d @ np.array(frame.z))
-        point = o + t[:, None] * d
-        local = point - np.array(frame.origin)
-        x, y = local @ np.array(frame.x), local @ np.array(frame.y)
-        on = (t > 0) & (np.abs(x) <= plane.size[0] / 2) & (np.abs(y) <= plane.size[1] / 2)
-    status[(status == Status.HIT) & ~on] = Status.MISS
-    chords = [Body(solid).chord(o, d) for solid in scene.solids]
-    blocked, _, _ = _next_interface(chords, paths.inside)
-    status[(status == Status.HIT) & (blocked < t)] = Status.CUT
-    landed = status == Status.HIT
-    point[~landed] = np.nan
-    sigma = np.array([medium.absorption for medium in scene.media])
-    depth = paths.absorbed + np.where(landed, t, 0.0)[:, None] * sigma[paths.medium]
-    return Landing(status, point, np.exp(-depth))
+        for k, letter in enumerate(path):
+            if k:
+                chords = [body.chord(o, d) for body in bodies]
+            t, n, which = _next_interface(chords, inside)
+            status[(status == Status.HIT) & ~np.isfinite(t)] = Status.MISS
+            live = status == Status.HIT
+            t = np.where(live, t, 0.0)
+            o = o + t[:, None] * d
+            absorbed += t[:, None] * sigma[medium]
+            facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
+            beyond = np.where(
+                live, _beyond(bodies, which, inside[which, rows] if bodies else live), 0
+            )
+            c = np.clip(-np.einsum("ij,ij->i", d, facing), 0, 1)
+            reflectance = fresnel(c, ior[medium], ior[beyond])
+            cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
+            if letter == "R":
+                weight *= np.where(live, reflectance, 1.0)
+                d = np.where(live[:, None], reflect(d, facing), d)
+                continue
+            bent, total = refract(d, facing, ior[medium], ior[beyond])
+            status[live & total] = Status.TIR
+            live &= ~total
+            weight *= np.where(live, 1 - reflectance, 1.0)
+            d = np.where(live[:, None], bent, d)
+            inside[which[live], np.flatnonzero(live)] ^= True
+            medium = np.where(live, beyond, medium)
+        ahead, _, _ = _next_interface([body.chord(o, d) for body in bodies], inside)
+        return TruePaths(
+            status, o, d, medium, weight, absorbed, cos_i, interface, normals, inside, ahead
+        )
+
+    def land(self, paths: TruePaths, plane: Rectangle) -> Landing:
+        """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
+        frame = plane.frame
+        o, d = paths.origin, paths.direction
+        status = paths.status.copy()
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = ((np.array(frame.origin) - o) @ np.array(frame.z)) / (d @ np.array(frame.z))
+            point = o + t[:, None] * d
+            local = point - np.array(frame.origin)
+            x, y = local @ np.array(frame.x), local @ np.array(frame.y)
+            on = (t > 0) & (np.abs(x) <= plane.size[0] / 2) & (np.abs(y) <= plane.size[1] / 2)
+        status[(status == Status.HIT) & ~on] = Status.MISS
+        status[(status == Status.HIT) & (paths.ahead < t)] = Status.CUT
+        landed = status == Status.HIT
+        point[~landed] = np.nan
+        sigma = np.array([medium.absorption for medium in self.scene.media])
+        depth = paths.absorbed + np.where(landed, t, 0.0)[:, None] * sigma[paths.medium]
+        return Landing(status, point, np.exp(-depth))
 
 
 def _next_interface(

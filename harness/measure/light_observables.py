@@ -142,7 +142,8 @@ def _boundary(
 def _expected_level(truth: ProbeTruth, n2: bool) -> tuple[Float, NDArray[np.bool_]]:
     """(m, 3) true pixel values and the rays that count, dark ones among them."""
     landed = truth.landings[0].status == Status.HIT
-    used = ~truth.grazing
+    # A ray that meets fewer interfaces than the path has goes another way, and may well be lit.
+    used = ~truth.grazing & (truth.paths.status != Status.MISS)
     if not (used & landed).any():
         raise Unmeasurable("no ray takes this path to the plane")
     scale = np.ones(len(landed))

@@ -16,7 +16,7 @@ from harness.camera import primary_rays
 from harness.expected import Float
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Rectangle, ResolvedScene
-from harness.truth import Landing, TruePaths, follow, land
+from harness.truth import ClosedForm, Landing, TruePaths
 
 # Step of the differences, relative to the scene's extent. Larger than any float32 renderer's own
 # error, so that a ray within that error of an edge is recognised as grazing it.
@@ -86,14 +86,15 @@ class ProbeTruth:
 def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) -> ProbeTruth:
     """Raises ValueError where the scene has no closed form."""
     rays = primary_rays(scene)
-    paths = follow(scene, rays, path)
-    landings = tuple(land(scene, paths, plane) for plane in planes)
+    exact = ClosedForm(scene)
+    paths = exact.follow(rays, path)
+    landings = tuple(exact.land(paths, plane) for plane in planes)
     extent = _extent(rays, landings)
     grazing = np.zeros(len(rays.origins), bool)
     squares = {key: np.zeros(len(grazing)) for key in ("po", "pd", "do", "dd", "lo", "ld")}
     for kind, shifted in _shifted(rays, STEP * extent):
-        other = follow(scene, shifted, path)
-        other_landings = [land(scene, other, plane) for plane in planes]
+        other = exact.follow(shifted, path)
+        other_landings = [exact.land(other, plane) for plane in planes]
         grazing |= _fate_differs(paths, other)
         step = STEP * extent if kind == "o" else STEP
         squares["d" + kind] += _rate(paths.direction, other.direction, step)

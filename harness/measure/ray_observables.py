@@ -19,7 +19,7 @@ from harness.measure.rays import RayMeasurement
 from harness.record import Curve
 from harness.renderers.base import Status
 from harness.scene.resolved import Mesh, Solid, Sphere
-from harness.truth import follow
+from harness.truth import ClosedForm
 
 
 def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
@@ -222,7 +222,8 @@ def tessellation_error(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) 
     direction = _direction(rays)
     used, fault, counts = _used(truth, rays)
     sphere = _circumscribed(truth.scene.solids[0])
-    smooth = follow(truth.scene.model_copy(update={"solids": (sphere,)}), truth.rays, truth.path)
+    ball = ClosedForm(truth.scene.model_copy(update={"solids": (sphere,)}))
+    smooth = ball.follow(truth.rays, truth.path)
     used = used & (smooth.status == Status.HIT)
 
     def rms(d: Float) -> float:
@@ -288,7 +289,9 @@ def _used(
 ) -> tuple[NDArray[np.bool_], str, dict[str, float | int | str]]:
     """The rays that count, what is wrong with the others, and how many there are of each."""
     landed = np.all([landing.status == Status.HIT for landing in truth.landings], axis=0)
-    nowhere = np.all([landing.status != Status.HIT for landing in truth.landings], axis=0)
+    # A ray that meets fewer interfaces than the path has goes another way, and may well be seen.
+    elsewhere = truth.paths.status == Status.MISS
+    nowhere = ~elsewhere & np.all([x.status != Status.HIT for x in truth.landings], axis=0)
     owed = landed & ~truth.grazing & ~rays.faint
     lost = owed & ~rays.seen
     ghosts = nowhere & ~truth.grazing & (rays.seen | rays.undecided)
