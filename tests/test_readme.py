@@ -32,10 +32,8 @@ def test_the_scene_that_it_shows_is_a_scene(tmp_path: Path) -> None:
     ]
 
 
-# At the start of a code span or of a line of a block.
-COMMANDS = sorted(
-    set(re.findall(r"(?:`|^)(?:\.venv/bin/)?snellcheck ([a-z]+)", README, re.MULTILINE))
-)
+CODE = "\n".join(blocks("") + re.findall(r"`([^`\n]+)`", README))
+COMMANDS = sorted(set(re.findall(r"^(?:\.venv/bin/)?snellcheck ([a-z]+)", CODE, re.MULTILINE)))
 
 
 @pytest.mark.parametrize("command", COMMANDS)
