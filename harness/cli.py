@@ -66,8 +66,8 @@ scenes_option = click.option(
     help="Folder of scene files instead of the built-in suite.",
 )
 quality_option = click.option(
-    "--quality", type=click.Choice(["draft", "normal", "high"]), default="normal", show_default=True,
-    help="Image size and samples.",
+    "--quality", type=click.Choice(["draft", "normal", "high"]), default="normal",
+    show_default=True, help="Image size and samples.",
 )  # fmt: skip
 
 

@@ -18,12 +18,12 @@ from harness.errors import InputError
 
 Document = TypeVar("Document", bound="BaseModel")
 
-RECORD_SCHEMA = "snellcheck-record/1"
-SUMMARY_SCHEMA = "snellcheck-summary/1"
+RECORD_SCHEMA: Literal["snellcheck-record/1"] = "snellcheck-record/1"
+SUMMARY_SCHEMA: Literal["snellcheck-summary/1"] = "snellcheck-summary/1"
 
 
 class Verdict(enum.StrEnum):
-    """PASS and KNOWN are green. KNOWN is a deviation that the scene documents, at its stated size."""
+    """PASS and KNOWN are green; KNOWN is a deviation of the size that the scene documents."""
 
     PASS = "pass"
     FAIL = "fail"
