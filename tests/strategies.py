@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,23 +20,23 @@ from harness.scene.resolve import resolve
 Document = dict[str, Any]
 
 
+@cache
 def numbers(least: float, most: float) -> st.SearchStrategy[float]:
-    """Numbers of few digits, as people write them."""
-    return (
-        st.floats(least, most, allow_nan=False)
-        .map(lambda x: float(f"{x:.4g}"))
-        .filter(lambda x: least <= x <= most)
-    )
+    """A thousand numbers of few digits, as people write them, both ends among them."""
+    return st.integers(0, 1000).map(lambda k: float(f"{least + (most - least) * k / 1000:.6g}"))
 
 
+@cache
 def points(reach: float = 10.0) -> st.SearchStrategy[list[float]]:
     return st.tuples(*[numbers(-reach, reach)] * 3).map(list)
 
 
+@cache
 def colors(most: float = 1.0) -> st.SearchStrategy[list[float]]:
     return st.tuples(*[numbers(0, most)] * 3).map(list)
 
 
+@cache
 def directions() -> st.SearchStrategy[list[float]]:
     """Vectors with a direction that no rounding can lose."""
     return points(1.0).filter(lambda v: math.hypot(*v) > 0.1)
@@ -44,11 +45,13 @@ def directions() -> st.SearchStrategy[list[float]]:
 # --- scene files ----------------------------------------------------------------------------------
 
 
+@cache
 def rotations() -> st.SearchStrategy[list[Document]]:
     one = st.fixed_dictionaries({"axis": directions(), "angle": numbers(-360, 360)})
     return st.lists(one, max_size=2)
 
 
+@cache
 def convex_shapes() -> st.SearchStrategy[Document]:
     """Boxes, slabs and prisms within 6 units of their place."""
     sizes = numbers(0.1, 3)
@@ -72,6 +75,7 @@ def convex_shapes() -> st.SearchStrategy[Document]:
     return st.one_of(*(st.fixed_dictionaries(keys, optional=turn) for keys in (box, slab, prism)))
 
 
+@cache
 def solid_shapes() -> st.SearchStrategy[Document]:
     """Shapes of every kind that needs no file, within 6 units of the origin."""
     round_ones = st.one_of(
@@ -100,6 +104,7 @@ def solid_shapes() -> st.SearchStrategy[Document]:
     return st.one_of(round_ones, convex_shapes(), polygons)
 
 
+@cache
 def patterns() -> st.SearchStrategy[Document]:
     cells = st.tuples(st.integers(1, 64), st.integers(1, 64)).map(list)
     return st.one_of(
@@ -114,6 +119,7 @@ def patterns() -> st.SearchStrategy[Document]:
     )
 
 
+@cache
 def materials() -> st.SearchStrategy[Document]:
     parts = st.tuples(numbers(0, 0.5), numbers(0, 0.5))
     return st.one_of(
@@ -138,6 +144,7 @@ def materials() -> st.SearchStrategy[Document]:
     )
 
 
+@cache
 def cameras() -> st.SearchStrategy[Document]:
     """Cameras outside of what `documents` build, looking at it."""
     place = {"origin": points(3).map(lambda p: [p[0], p[1], 20.0]), "target": points(2)}
@@ -156,7 +163,7 @@ def documents(draw: st.DrawFn) -> Document:
             "shape": {
                 "type": "rectangle",
                 "center": [0.0, 0.0, -10.0 - k],
-                "size": draw(st.tuples(numbers(1, 20), numbers(1, 20)).map(list)),
+                "size": [draw(numbers(1, 20)), draw(numbers(1, 20))],
             },
             "material": draw(materials()),
         }
@@ -194,6 +201,7 @@ def cases_of(document: Document) -> list[LoadedCase]:
     ]
 
 
+@cache
 def resolved_scenes() -> st.SearchStrategy[resolved.ResolvedScene]:
     """Valid scenes with one solid of any shape and up to three surfaces."""
     return documents().map(lambda document: resolve(cases_of(document)[0]))

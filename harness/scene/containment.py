@@ -86,8 +86,8 @@ def relation(a: resolved.SolidShape, b: resolved.SolidShape, tolerance: float) -
     if np.any(a_low > b_high) or np.any(b_low > a_high):
         return Relation.APART
     a_middle, b_middle = (a_low + a_high) / 2, (b_low + b_high) / 2
-    of_a = signed_distance(b, _samples(a, b_middle, b))
-    of_b = signed_distance(a, _samples(b, a_middle, a))
+    of_a = _depths(b, _samples(a, b_middle), tolerance)
+    of_b = _depths(a, _samples(b, a_middle), tolerance)
     a_in, a_out = (of_a < -tolerance).any(), (of_a > tolerance).any()
     b_in, b_out = (of_b < -tolerance).any(), (of_b > tolerance).any()
     if (a_in and a_out) or (b_in and b_out) or (a_in and b_in):
@@ -99,6 +99,22 @@ def relation(a: resolved.SolidShape, b: resolved.SolidShape, tolerance: float) -
     if a_in:
         return Relation.INSIDE
     return Relation.AROUND if b_in else Relation.APART
+
+
+def _depths(shape: resolved.SolidShape, points: Points, tolerance: float) -> NDArray[np.float64]:
+    """Signed distances, infinite beyond the shape's bounds; of a large mesh, to some points."""
+    low, high = bounds(shape)
+    near = np.all((points >= low - tolerance) & (points <= high + tolerance), axis=1)
+    depths = np.full(len(points), np.inf)
+    if isinstance(shape, resolved.Mesh):
+        most = max(8, MOST_WORK // len(shape.triangles))
+        chosen = np.flatnonzero(near)
+        chosen = chosen[:: max(1, -(-len(chosen) // most))]
+        depths[near] = 0.0
+        depths[chosen] = signed_distance(shape, points[chosen])
+    else:
+        depths[near] = signed_distance(shape, points[near])
+    return depths
 
 
 def containers(shapes: Sequence[resolved.SolidShape], tolerance: float) -> list[int | None]:
@@ -145,8 +161,8 @@ def innermost(
 # --- sample points --------------------------------------------------------------------------------
 
 
-def _samples(shape: resolved.SolidShape, towards: Points, other: resolved.SolidShape) -> Points:
-    """Points on the surface of `shape`, few enough to be compared with `other`."""
+def _samples(shape: resolved.SolidShape, towards: Points) -> Points:
+    """Points on the surface of `shape`, among them the ones nearest to `towards` on a sphere."""
     match shape:
         case resolved.Sphere():
             center = np.array(shape.center)
@@ -154,16 +170,15 @@ def _samples(shape: resolved.SolidShape, towards: Points, other: resolved.SolidS
             size = np.linalg.norm(line)
             # The points nearest to and farthest from another sphere decide alone.
             ends = [line / size, -line / size] if size > 0 else []
-            points = center + shape.radius * np.array([*ends, *_sphere_directions()])
+            return center + shape.radius * np.array([*ends, *_sphere_directions()])
         case resolved.Convex():
-            points = _polyhedron_samples(shape)
+            return _polyhedron_samples(shape)
         case resolved.Cylinder():
-            points = _cylinder_samples(shape)
+            return _cylinder_samples(shape)
         case resolved.Mesh():
             vertices = np.array(shape.vertices)
-            points = np.concatenate([vertices, vertices[np.array(shape.triangles)].mean(axis=1)])
-    most = MOST_WORK // len(other.triangles) if isinstance(other, resolved.Mesh) else 10_000
-    return points[:: max(1, -(-len(points) // max(most, 8)))]
+            middles = vertices[np.array(shape.triangles)].mean(axis=1)
+            return np.concatenate([vertices, middles])
 
 
 def _sphere_directions() -> Points:
@@ -225,8 +240,7 @@ def _crossing(a: resolved.SolidShape, b: resolved.SolidShape, tolerance: float) 
         outside = (signed_distance(b, edges[0]) > tolerance).any()
         return bool(outside) and _enters(starts, ends, b, tolerance)
     if isinstance(b, resolved.Mesh) and len(starts) * len(b.triangles) <= MOST_WORK:
-        triangles = np.array(b.vertices)[np.array(b.triangles)]
-        return any(_pierced(starts, ends, triangle, tolerance) for triangle in triangles)
+        return _pierced(starts, ends, np.array(b.vertices)[np.array(b.triangles)], tolerance)
     return False
 
 
@@ -253,22 +267,21 @@ def _enters(starts: Points, ends: Points, solid: resolved.Convex, tolerance: flo
     return bool((~beside & (first < last)).any())
 
 
-def _pierced(starts: Points, ends: Points, triangle: Points, tolerance: float) -> bool:
+def _pierced(starts: Points, ends: Points, triangles: Points, tolerance: float) -> bool:
     """Whether any segment passes from one side of a triangle to the other, inside of it."""
-    a, b, c = triangle
-    normal = np.cross(b - a, c - a)
-    normal = normal / np.linalg.norm(normal)
-    before, after = (starts - a) @ normal, (ends - a) @ normal
-    through = ((before > tolerance) & (after < -tolerance)) | (
-        (before < -tolerance) & (after > tolerance)
-    )
-    if not through.any():
-        return False
-    start, end = starts[through], ends[through]
-    share = before[through] / (before[through] - after[through])
-    hit = start + share[:, None] * (end - start)
+    a, b, c = (triangles[:, k] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    heights = np.sum(normals * a, axis=1)
+    before, after = starts @ normals.T - heights, ends @ normals.T - heights
+    down = (before > tolerance) & (after < -tolerance)
+    up = (before < -tolerance) & (after > tolerance)
+    segment, triangle = np.nonzero(down | up)
+    share = before[segment, triangle] / (before - after)[segment, triangle]
+    hit = starts[segment] + share[:, None] * (ends - starts)[segment]
     inside = np.ones(len(hit), dtype=bool)
     for one, other in ((a, b), (b, c), (c, a)):
-        inward = np.cross(normal, other - one)
-        inside &= (hit - one) @ inward > tolerance * np.linalg.norm(inward)
+        inward = np.cross(normals, other - one)
+        inward = inward / np.linalg.norm(inward, axis=1, keepdims=True)
+        inside &= np.sum((hit - one[triangle]) * inward[triangle], axis=1) > tolerance
     return bool(inside.any())

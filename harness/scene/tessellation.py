@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from harness.scene.vectors import Matrix
 
 Points = NDArray[np.float64]  # (n, 3)
 Triangles = NDArray[np.int64]  # (m, 3)
+
+MOST_AT_ONCE = 100_000  # points x triangles
 
 
 def placed(points: Points, turn: Matrix, origin: tuple[float, float, float]) -> Points:
@@ -88,34 +91,50 @@ def winding(points: Points, vertices: Points, triangles: Triangles) -> NDArray[n
     Sum of the solid angles of its triangles: A. van Oosterom and J. Strackee, "The solid angle
     of a plane triangle", IEEE Trans. Biomed. Eng. 30 (1983).
     """
-    result = np.empty(len(points))
-    for k, point in enumerate(points):
-        a, b, c = (vertices[triangles[:, i]] - point for i in range(3))
-        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-        volume = np.sum(a * np.cross(b, c), axis=1)
-        below = la * lb * lc + np.sum(a * b, 1) * lc + np.sum(b * c, 1) * la + np.sum(c * a, 1) * lb
-        result[k] = np.sum(np.arctan2(volume, below)) / (2 * np.pi)
-    return result
+    corners = vertices[triangles]
+    return _by_parts(points, len(triangles), lambda part: _winding(part, corners))
+
+
+def _winding(points: Points, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
+    la, lb, lc = (np.sqrt(_dot(v, v)) for v in (a, b, c))
+    spanned = _dot(a, np.cross(b, c))
+    cosines = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+    return np.asarray(np.sum(np.arctan2(spanned, cosines), axis=1) / (2 * np.pi))
 
 
 def distance(points: Points, vertices: Points, triangles: Triangles) -> NDArray[np.float64]:
     """Distance of each point to the nearest triangle; (n,)."""
-    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    corners = vertices[triangles]
+    return _by_parts(points, len(triangles), lambda part: _distance(part, corners))
+
+
+def _distance(points: Points, corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    a, b, c = (corners[:, k] for k in range(3))
     normal = np.cross(b - a, c - a)
-    size = np.linalg.norm(normal, axis=1)
-    normal = normal / np.where(size > 0, size, 1.0)[:, None]
-    result = np.empty(len(points))
-    for k, point in enumerate(points):
-        nearest = np.full(len(triangles), np.inf)
-        within = size > 0
-        for start, end in ((a, b), (b, c), (c, a)):
-            side = end - start
-            along = np.sum((point - start) * side, axis=1) / np.maximum(
-                np.sum(side * side, axis=1), np.finfo(float).tiny
-            )
-            foot = start + np.clip(along, 0, 1)[:, None] * side
-            nearest = np.minimum(nearest, np.linalg.norm(point - foot, axis=1))
-            within &= np.sum(np.cross(side, point - start) * normal, axis=1) >= 0
-        height = np.abs(np.sum((point - a) * normal, axis=1))
-        result[k] = np.min(np.where(within, height, nearest))
-    return result
+    size = np.sqrt(_dot(normal, normal))[:, None]
+    normal = normal / np.where(size > 0, size, 1.0)
+    nearest = np.full((len(points), len(corners)), np.inf)
+    within = np.broadcast_to(size[:, 0] > 0, nearest.shape)
+    for start, end in ((a, b), (b, c), (c, a)):
+        side = end - start
+        away = points[:, None] - start
+        share = _dot(away, side) / np.maximum(_dot(side, side), np.finfo(float).tiny)
+        rest = away - np.clip(share, 0, 1)[..., None] * side
+        nearest = np.minimum(nearest, np.sqrt(_dot(rest, rest)))
+        within = within & (_dot(away, np.cross(normal, side)) >= 0)
+    height = np.abs(_dot(points[:, None] - a, normal))
+    return np.asarray(np.min(np.where(within, height, nearest), axis=1))
+
+
+def _dot(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("...k,...k->...", a, b))
+
+
+def _by_parts(
+    points: Points, triangles: int, measure: Callable[[Points], NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Measures some points at a time, so that memory stays bounded."""
+    step = max(1, MOST_AT_ONCE // triangles)
+    parts = [measure(points[k : k + step]) for k in range(0, len(points), step)]
+    return np.concatenate(parts) if parts else np.zeros(0)
