@@ -8,7 +8,8 @@ What POV-Ray does otherwise than a scene defines, and what follows from it
 ------------------------------------------------------------------------
 * Hits nearer than 1e-4 units are dropped and images clip at 1: lengths and radiance are scaled
   (see `povray_fit`), and `PovScene.exposure` must be divided out of the pixels.
-* Indices of refraction are single precision, as are colours and meshes: 6e-8 relative.
+* Indices of refraction and their ratios between nested media are single precision, as are colours
+  and meshes: 6e-8 relative.
 * A medium's index is taken relative to media[0], since POV-Ray's atmosphere has index 1.
 * `max_trace_level` ends at 256. Faces without refraction (translucent ones, and solids of the
   index of what they stand in) do not count towards it.
