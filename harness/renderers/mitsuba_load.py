@@ -1,0 +1,86 @@
+"""A live Mitsuba scene from the description of `harness.translate.mitsuba`.
+
+Imported only in the process that hosts Mitsuba, after its variant was chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.translate.mitsuba_shapes import Node
+
+
+@dataclass(frozen=True)
+class Live:
+    """A `mitsuba.Scene`, and its absorbing media by the description's keys."""
+
+    scene: Any
+    media: dict[str, Any]
+
+
+def load(mi: Any, description: Node) -> Live:
+    """Makes a description live; `mi` is the mitsuba module with its variant set.
+
+    Shapes keep the description's keys as their ids: nothing is merged or deduplicated.
+    """
+    media = {
+        name: mi.load_dict(_plain(mi, node, {}))
+        for name, node in description.items()
+        if name.startswith("medium_")
+    }
+    scene = {
+        name: _mesh(mi, name, node, media) if _is_mesh(node) else _plain(mi, node, media)
+        for name, node in description.items()
+        if name not in media
+    }
+    return Live(mi.load_dict(scene, optimize=False), media)
+
+
+def _is_mesh(node: Any) -> bool:
+    return isinstance(node, dict) and node["type"] == "mesh"
+
+
+def _plain(mi: Any, node: Any, media: dict[str, Any]) -> Any:
+    """`node` with Mitsuba's objects for transforms, pixels and references to media."""
+    if not isinstance(node, dict):
+        return node
+    if node["type"] == "ref":
+        return media[node["id"]]
+    result = {}
+    for key, value in node.items():
+        if key in ("to_world", "to_uv"):
+            result[key] = mi.ScalarTransform4f(value)
+        elif key == "pixels":
+            result["data"] = mi.TensorXf(value)
+        else:
+            result[key] = _plain(mi, value, media)
+    return result
+
+
+def _mesh(mi: Any, name: str, node: Node, media: dict[str, Any]) -> Any:
+    properties = mi.Properties()
+    for key in ("bsdf", "emitter", "interior", "exterior"):
+        if key in node:
+            child = _plain(mi, node[key], media)
+            properties[key] = mi.load_dict(child) if isinstance(child, dict) else child
+    mesh = mi.Mesh(
+        name,
+        vertex_count=len(node["vertices"]),
+        face_count=len(node["triangles"]),
+        props=properties,
+        has_vertex_normals="normals" in node,
+        has_vertex_texcoords="texcoords" in node,
+    )
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.ravel(node["vertices"])
+    parameters["faces"] = np.ravel(node["triangles"])
+    if "normals" in node:
+        parameters["vertex_normals"] = np.ravel(node["normals"])
+    if "texcoords" in node:
+        parameters["vertex_texcoords"] = np.ravel(node["texcoords"])
+    parameters.update()
+    mesh.set_id(name)
+    return mesh

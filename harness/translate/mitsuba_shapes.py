@@ -1,0 +1,128 @@
+"""Shapes of the resolved scene as Mitsuba's shapes, in the description's terms.
+
+See `harness.translate.mitsuba` for what stands for meshes and transforms.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from harness.scene import resolved as rs
+
+Node = dict[str, Any]
+Matrix = list[list[float]]
+
+# A disk that bears a pattern becomes a fan of triangles, since Mitsuba's disk has polar texture
+# coordinates. The chord of 1/4096 of a circle is 3e-7 of the radius away from the arc.
+FAN_SECTORS = 4096
+
+
+def affine(x: Any, y: Any, z: Any, origin: Any) -> Matrix:
+    """The 4 x 4 matrix with columns x, y, z and origin."""
+    matrix = np.eye(4)
+    matrix[:3] = np.column_stack([x, y, z, origin])
+    rows: Matrix = matrix.tolist()
+    return rows
+
+
+def parts(shape: rs.SolidShape | rs.SurfaceShape) -> Iterator[tuple[str, Node]]:
+    """Mitsuba shapes that make up `shape`, each with a suffix for its name."""
+    match shape:
+        case rs.Sphere():
+            yield "", {"type": "sphere", "center": list(shape.center), "radius": shape.radius}
+        case rs.Convex():
+            yield "", _convex(shape)
+        case rs.Mesh():
+            yield "", _mesh(shape.vertices, shape.triangles, normals=shape.normals)
+        case rs.Cylinder():
+            yield from _cylinder(shape)
+        case rs.Rectangle():
+            yield "", {"type": "rectangle", "to_world": _on_frame(shape.frame, *shape.size)}
+        case rs.Disk():
+            across = 2 * shape.radius
+            yield "", {"type": "disk", "to_world": _on_frame(shape.frame, across, across)}
+
+
+def _on_frame(frame: rs.Frame, width: float, height: float) -> Matrix:
+    """Takes Mitsuba's [-1, 1]^2 to a face of `width` x `height` on `frame`."""
+    x, y = np.array(frame.x) * width / 2, np.array(frame.y) * height / 2
+    return affine(x, y, frame.z, frame.origin)
+
+
+def _mesh(vertices: Any, triangles: Any, normals: Any = None, texcoords: Any = None) -> Node:
+    node: Node = {
+        "type": "mesh",
+        "vertices": np.asarray(vertices, np.float32),
+        "triangles": np.asarray(triangles, np.uint32),
+    }
+    if normals is not None:
+        node["normals"] = np.asarray(normals, np.float32)
+    if texcoords is not None:
+        node["texcoords"] = np.asarray(texcoords, np.float32)
+    return node
+
+
+def _convex(shape: rs.Convex) -> Node:
+    """Every polygon as a fan of triangles around its first vertex."""
+    triangles = [
+        (face[0], face[k], face[k + 1]) for face in shape.faces for k in range(1, len(face) - 1)
+    ]
+    return _mesh(shape.vertices, triangles)
+
+
+def _cylinder(shape: rs.Cylinder) -> Iterator[tuple[str, Node]]:
+    """Mitsuba's cylinder is open, so two disks close it, facing outwards."""
+    frame, half = shape.frame, shape.height / 2
+    origin, axis = np.array(frame.origin), np.array(frame.z)
+    x, y = shape.radius * np.array(frame.x), shape.radius * np.array(frame.y)
+    bottom, top = origin - half * axis, origin + half * axis
+    yield (
+        "_side",
+        {
+            "type": "cylinder",
+            "p0": bottom.tolist(),
+            "p1": top.tolist(),
+            "radius": shape.radius,
+        },
+    )
+    yield "_top", {"type": "disk", "to_world": affine(x, y, axis, top)}
+    yield "_bottom", {"type": "disk", "to_world": affine(x, -y, -axis, bottom)}
+
+
+def fan(disk: rs.Disk) -> Node:
+    angle = np.linspace(0, 2 * math.pi, FAN_SECTORS, endpoint=False)
+    plane = np.vstack([[0.0, 0.0], np.column_stack([np.cos(angle), np.sin(angle)])])
+    rim = np.arange(FAN_SECTORS)
+    triangles = np.column_stack([0 * rim, 1 + rim, 1 + (rim + 1) % FAN_SECTORS])
+    vertices = np.array(disk.frame.origin) + disk.radius * (
+        plane[:, :1] * np.array(disk.frame.x) + plane[:, 1:] * np.array(disk.frame.y)
+    )
+    return _mesh(vertices, triangles, texcoords=(plane + 1) / 2)
+
+
+def code_strips(shape: rs.Rectangle, code: rs.PositionCode) -> Node:
+    """The rectangle cut into one strip per cell, whose texture coordinates are (fine, coarse).
+
+    A texture that repeats has no seam between cells this way, and the triangles interpolate both
+    codes to single precision: 9e-7 units on 16 units with 1000 cells.
+    """
+    edges = np.linspace(0.0, 1.0, code.cells + 1)
+    coarse = np.column_stack([edges[:-1], edges[1:], edges[1:], edges[:-1]]).ravel()
+    fine = np.tile([0.0, 1.0, 1.0, 0.0], code.cells)
+    across = np.tile([0.0, 0.0, 1.0, 1.0], code.cells)
+    corner = 4 * np.arange(code.cells)[:, None]
+    if code.axis == "u":
+        u, v, quad = coarse, across, (0, 1, 2, 0, 2, 3)
+    else:  # the corners go the other way round
+        u, v, quad = across, coarse, (0, 2, 1, 0, 3, 2)
+    triangles = (corner + np.array(quad)).reshape(-1, 3)
+    vertices = (
+        np.array(shape.frame.origin)
+        + ((u - 0.5) * shape.size[0])[:, None] * np.array(shape.frame.x)
+        + ((v - 0.5) * shape.size[1])[:, None] * np.array(shape.frame.y)
+    )
+    return _mesh(vertices, triangles, texcoords=np.column_stack([fine, coarse]))

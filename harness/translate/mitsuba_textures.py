@@ -1,0 +1,69 @@
+"""Patterns of the resolved scene as Mitsuba's textures: small float32 bitmaps, taken raw.
+
+Mitsuba's own checkerboard refuses radiance above 1, and its colours go through a reflectance model.
+"""
+
+from __future__ import annotations
+
+import base64
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.errors import RendererUnsupported
+from harness.scene import resolved as rs
+from harness.translate.mitsuba_shapes import Matrix, Node, affine
+
+
+def texture(pattern: rs.Pattern) -> Node:
+    """A texture over (u, v). Raises RendererUnsupported where `pattern` is not one texture."""
+    match pattern:
+        case rs.Checker():
+            # 2 x 2 texels, repeated
+            x, y = pattern.cells
+            texels = [[pattern.a, pattern.b], [pattern.b, pattern.a]]
+            return _bitmap(texels, "nearest", "repeat", _uv_map((x / 2, y / 2), (0, 0)))
+        case rs.Ramp(axis="u"):
+            return _ramp([[pattern.start, pattern.end], [pattern.start, pattern.end]])
+        case rs.Ramp():
+            return _ramp([[pattern.start, pattern.start], [pattern.end, pattern.end]])
+        case rs.Picture():
+            return _bitmap(
+                picture_pixels(pattern)[::-1], "nearest", "clamp", _uv_map((1, 1), (0, 0))
+            )
+    raise RendererUnsupported(f"no texture for a {pattern.type}")
+
+
+def _bitmap(pixels: Any, filter_type: str, wrap_mode: str, to_uv: Matrix) -> Node:
+    return {
+        "type": "bitmap",
+        "pixels": np.ascontiguousarray(pixels, np.float32),
+        "raw": True,
+        "format": "variant",
+        "filter_type": filter_type,
+        "wrap_mode": wrap_mode,
+        "to_uv": to_uv,
+    }
+
+
+def _ramp(texels: Any) -> Node:
+    """Bilinear between four texels, whose centres are at 1/4 and 3/4: [0, 1] is taken there."""
+    return _bitmap(texels, "bilinear", "clamp", _uv_map((0.5, 0.5), (0.25, 0.25)))
+
+
+def _uv_map(scale: tuple[float, float], offset: tuple[float, float]) -> Matrix:
+    return affine((scale[0], 0, 0), (0, scale[1], 0), (0, 0, 1), (*offset, 0))
+
+
+def picture_pixels(pattern: rs.Picture) -> NDArray[np.float32]:
+    """Radiance (height, width, 3), row 0 at the top."""
+    values = np.frombuffer(base64.b64decode(pattern.pixels), "<u2")
+    pixels = values.reshape(pattern.height, pattern.width, 3) / np.float64(65535)
+    return pixels.astype(np.float32)
+
+
+def code_texture(code: rs.PositionCode) -> Node:
+    """The code over (fine, coarse): amplitude * (coarse, fine, 1)."""
+    texels = [[(row, column, 1.0) for column in (0.0, 1.0)] for row in (0.0, 1.0)]
+    return _ramp(code.amplitude * np.array(texels))
