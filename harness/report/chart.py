@@ -93,7 +93,9 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
     points = list(zip(residual.x, residual.y, strict=False))
     runs = [_thinned(run, width // 2) for run in _finite_runs(points)]
     placed = [[(x_axis.place(x), y_axis.place(y)) for x, y in run] for run in runs]
-    few = slice(None, None, max(1, len(residual.x) // 8))
+    step = max(1, len(residual.x) // 8)
+    few = [*range(0, len(residual.x) - 1, step), len(residual.x) - 1]
+    tolerance = [curve.tolerance[k] for k in few if k < len(curve.tolerance)]
     return Markup(
         '<svg class="spark {}" viewBox="0 0 {} {}" role="img" aria-label="{}">'
         '<path class="band" d="{}"/><path class="line" d="{}"/></svg>'
@@ -102,7 +104,7 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
         width,
         height,
         f"residuals of {clean(renderer)}",
-        _band_outline(residual.x[few], curve.tolerance[few], x_axis, y_axis),
+        _band_outline([residual.x[k] for k in few], tolerance, x_axis, y_axis),
         "".join(map(_path, placed)),
     )
 

@@ -22,51 +22,66 @@ EXIT_CODES = {
 
 @dataclass(frozen=True)
 class Headline:
-    """The run in one sentence. `state` is a verdict's name, for its colour and icon."""
+    """The run in one sentence. `state` is a verdict's name, for its colour and icon.
+
+    `worst` is the check that failed by most, or else the one that came closest to its limit;
+    `lead` says which.
+    """
 
     state: str
     text: str
-    worst: CheckView | None
-    worst_case: str
     also: list[str]
+    lead: str = ""
+    worst: CheckView | None = None
+    worst_case: str = ""
 
 
 def headline(summary: Summary) -> Headline:
     counts = dict.fromkeys(Verdict, 0)
-    views: list[tuple[tuple[int, float], str, CheckView]] = []
+    bad: list[tuple[tuple[bool, float], str, CheckView]] = []
+    good: list[tuple[float, str, CheckView]] = []
     for case in summary.cases:
         for check in case.checks:
             counts[check.status] += 1
+            view = check_view(check)
             if check.status in (Verdict.FAIL, Verdict.ERROR):
-                view = check_view(check)
                 # A wrong number is better news to open with than a missing one.
-                views.append(((check.status != Verdict.FAIL, view.rank[1]), case.id, view))
-    total = sum(counts.values())
+                bad.append(((check.status != Verdict.FAIL, view.rank[1]), case.id, view))
+            elif check.status == Verdict.PASS and view.ratio:
+                good.append((-view.ratio, case.id, view))
+    state, text = _sentence(summary, counts)
     also = _also(summary, counts)
-    if not total:
-        return Headline("error", "No checks were made", None, "", [*also, _NOTHING])
+    if bad:
+        _, case_id, view = min(bad, key=lambda item: item[0])
+        return Headline(state, text, also, "Worst:", view, case_id)
+    if good:
+        _, case_id, view = min(good, key=lambda item: item[0])
+        return Headline(state, text, also, "Closest to its limit:", view, case_id)
+    return Headline(state, text, also)
+
+
+def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:
+    total = sum(counts.values())
     fail, error, skip = counts[Verdict.FAIL], counts[Verdict.ERROR], counts[Verdict.SKIP]
-    if fail or error:
-        _, case_id, view = min(views, key=lambda item: item[0])
-        verb = "fails" if fail == 1 else "fail"
-        text = (
-            f"{fail} of {count(total, 'check')} {verb}"
-            if fail
-            else f"{error} of {count(total, 'check')} ended in an error"
-        )
-        return Headline("fail" if fail else "error", text, view, case_id, also)
+    if not total:
+        return "error", "No checks were made"
+    checks = count(total, "check")
+    if fail:
+        return "fail", f"{fail} of {checks} {'fails' if fail == 1 else 'fail'}"
+    if error:
+        return "error", f"{error} of {checks} ended in an error"
     if skip:
-        return Headline("skip", f"No check fails; {skip} of {total} were skipped", None, "", also)
+        return "skip", f"No check fails; {skip} of {total} were skipped"
     if summary.exit_code:
-        return Headline("error", f"{count(total, 'check')} passed, but not all ran", None, "", also)
-    return Headline("pass", f"All {count(total, 'check')} pass", None, "", also)
+        return "error", f"{checks} passed, but not all ran"
+    return "pass", "The only check passes" if total == 1 else f"All {checks} pass"
 
 
 _NOTHING = "A run without checks shows nothing, so it does not pass."
 
 
-def _also(summary: Summary, counts: dict[Verdict, int]) -> list[str]:
-    notes = []
+def _also(summary: Summary, counts: Mapping[Verdict, int]) -> list[str]:
+    notes = [] if sum(counts.values()) else [_NOTHING]
     if counts[Verdict.FAIL] and counts[Verdict.ERROR]:
         notes.append(f"{counts[Verdict.ERROR]} more ended in an error")
     if counts[Verdict.SKIP] and (counts[Verdict.FAIL] or counts[Verdict.ERROR]):
@@ -175,7 +190,10 @@ def _line(name: str, column: int, summary: Summary, rows: Sequence[Row]) -> Rend
         reason=clean(known.reason) if known else "",
         remedy=clean(known.remedy) if known else "",
         facts=[
-            (clean(key), clean(value) if isinstance(value, str) else number(value))
+            (
+                clean(key).replace("_", " "),
+                clean(value) if isinstance(value, str) else number(value),
+            )
             for key, value in facts.items()
         ],
         strip=[_mark(row, column) for row in rows],

@@ -40,7 +40,8 @@ def _trim(text: str) -> str:
 
 def with_unit(text: str, unit: str) -> str:
     """Degrees stand close to digits, other units after a narrow space; "1" and "" are no unit."""
-    if unit in ("", "1") or not text[-1:].isdigit():
+    unit = {"deg": "°", "1": ""}.get(unit, unit)
+    if not unit or not text[-1:].isdigit():
         return text
     close = unit == "°" and text[-1] in "0123456789"  # after a power of ten ° would look like one
     return text + ("" if close else NARROW_SPACE) + unit

@@ -36,13 +36,20 @@ BROWSER_TYPES = (".png", ".webp", ".jpg", ".jpeg", ".gif", ".avif", ".svg")
 
 @dataclass(frozen=True)
 class CheckView:
+    """A check with its figures as text. `ratio` is the error over the tolerance, None if unknown.
+
+    `main` and `limit` are for places where there is no room for value, expectation and tolerance.
+    """
+
     check: Check
-    ratio: float | None  # error over tolerance; None where nothing was measured
+    label: str  # the check's id without what stands beside it anyway, or ""
+    ratio: float | None
     value: str
     expected: str
     tolerance: str
-    limit: str  # expected and tolerance together, as short as can be
     error: str
+    main: str
+    limit: str
     used: str
     bar: float  # 0 … 1, for drawing
 
@@ -60,25 +67,33 @@ class CheckView:
 def check_view(check: Check) -> CheckView:
     value, expected, tolerance = check.value, check.expected, check.tolerance
     unit = clean(check.unit)
-    resolution = tolerance if expected else None
-    error = ratio = None
-    if value is not None and expected is not None:
-        error = value - expected
-        if tolerance is not None:
-            ratio = _ratio(abs(error), tolerance)
+    error = None if value is None or expected is None else value - expected
+    ratio = None if error is None or tolerance is None else _ratio(abs(error), tolerance)
+    # Where an expectation is known to very many digits, the error says more than the value does.
+    fine = bool(expected and tolerance and abs(expected) > 1e6 * tolerance)
+    resolution = tolerance if expected and not fine else None
+    digits = 6 if fine else 4
+
+    def text(figure: float | None) -> str:
+        return number(figure, resolution, digits)
+
+    label = clean(check.id.removesuffix(f"/{check.renderer}/{check.against}"))
     tolerance_text = with_unit(number(tolerance, digits=3), unit)
-    limit = ""
-    if tolerance is not None:
-        plain = number(expected, resolution)
-        limit = f"≤ {tolerance_text}" if not expected else f"{plain} ± {tolerance_text}"
+    value_text = with_unit(text(value), unit)
+    off = with_unit(number(error, digits=3), unit)
+    limit = (
+        f"≤ {tolerance_text}" if fine or not expected else f"{text(expected)} ± {tolerance_text}"
+    )
     return CheckView(
         check=check,
+        label="" if label == clean(check.observable) else label,
         ratio=ratio,
-        value=with_unit(number(value, resolution), unit),
-        expected=with_unit(number(expected, resolution), unit),
+        value=value_text,
+        expected=with_unit(text(expected), unit),
         tolerance=tolerance_text,
-        limit=limit,
-        error=with_unit(number(error, digits=3), unit) if expected else "",
+        error=off if expected and error is not None else "",
+        main=f"off by {off}" if fine and error is not None else value_text,
+        limit="" if tolerance is None else limit,
         used=share(ratio),
         bar=0.0 if ratio is None else 1.0 if math.isnan(ratio) else min(1.0, ratio),
     )
@@ -106,7 +121,8 @@ class Picture:
     full: str | None
     data: str | None  # the linear data, where it is no picture itself
     role: str
-    size: str
+    width: int
+    height: int
 
 
 def picture(image: ImageFile, folder: RunFolder) -> Picture:
@@ -118,7 +134,8 @@ def picture(image: ImageFile, folder: RunFolder) -> Picture:
         full=full,
         data=data if data != full else None,
         role=clean(image.role),
-        size=f"{image.width} × {image.height}",
+        width=image.width,
+        height=image.height,
     )
 
 
@@ -179,7 +196,7 @@ class Cell:
     bad: int
     reason: str
     picture: Picture | None
-    spark: Markup | None  # the residuals of the first curve, where there is no picture
+    spark: Markup | None  # the residuals of the first curve
 
 
 @dataclass(frozen=True)
@@ -262,7 +279,7 @@ def _cell(
         bad=sum(view.check.status in (Verdict.FAIL, Verdict.ERROR) for view in views),
         reason=reason,
         picture=shown,
-        spark=None if shown else spark,
+        spark=spark,
     )
 
 

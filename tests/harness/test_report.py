@@ -301,7 +301,9 @@ def test_case_page_links_record_scene_and_linear_data(run: Path) -> None:
 
 def test_all_pass(tmp_path: Path) -> None:
     text = index_of(small_run(tmp_path, passing())).text
-    assert "All 1 check pass" in text or "The only check passes" in text
+    assert "The only check passes" in text
+    closest = "slab-offset[ior=1.5] tracer slab_offset 1\u202f×\u202f10⁻¹³\u202funits"
+    assert f"Closest to its limit: {closest}" in text
 
 
 def test_no_cases_do_not_pass(tmp_path: Path) -> None:

@@ -13,13 +13,14 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from harness.errors import InputError
-from harness.record import Curve, Series
+from harness.record import Check, Curve, Series, Verdict
 from harness.report import pictures
 from harness.report.axis import Axis, for_residuals, spanning
 from harness.report.chart import MOST_POINTS, draw, sparkline
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE, colour_classes
 from harness.report.mathml import typeset
 from harness.report.quantity import number, seconds, share, with_unit
+from harness.report.view import check_view
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False, width=32)
 
@@ -77,6 +78,21 @@ def test_a_degree_sign_cannot_be_read_as_an_exponent() -> None:
     assert with_unit(number(1e-5), "°").endswith("⁵\u202f°")
     assert with_unit(number(math.nan), "°") == "NaN"
     assert with_unit("0.5", "1") == "0.5"
+
+
+def test_expectations_known_to_many_digits_are_told_by_their_error() -> None:
+    view = check_view(
+        Check(
+            id="internal_angle(in)/tracer/truth", renderer="tracer", against="truth", unit="deg",
+            observable="internal_angle", value=35.264389682, expected=35.264389681,
+            tolerance=1e-10, status=Verdict.FAIL, reason="",
+        )
+    )  # fmt: skip
+    assert view.label == "internal_angle(in)"
+    assert view.value == view.expected == "35.2644°"
+    assert view.main == "off by 1\u202f×\u202f10⁻⁹\u202f°"
+    assert view.limit == "≤ 1\u202f×\u202f10⁻¹⁰\u202f°"
+    assert view.used == "10×"
 
 
 def test_durations() -> None:
