@@ -29,6 +29,7 @@ ImageFormat = Literal["exr", "pfm", "npy", "png", "ppm"]
 # others are rare, and wrongly assumed they would spoil measurements rather than fail them.
 USUAL_CLAIMS = frozenset(Capability) - {
     Capability.RAYS,
+    Capability.DOUBLE,
     Capability.LOBE_SWITCH,
     Capability.THIN_SLAB,
     Capability.RADIANCE_N2,

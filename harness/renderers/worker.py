@@ -48,7 +48,6 @@ class Server:
         self._engine: Any = None
         self._operations: dict[str, Callable[[Message], Message]] = {
             "hello": self._hello,
-            "version": lambda _: {"version": self.engine.version()},
             "render": self._render,
             "trace": self._trace,
             "emit": self._emit,
@@ -93,7 +92,7 @@ class Server:
             "name": getattr(self.engine, "name", self._target),
             "version": self.engine.version(),
             "capabilities": sorted(str(capability) for capability in capabilities),
-            "operations": ["version", "render", *optional],
+            "operations": ["render", *optional],
         }
 
     def _render(self, request: Message) -> Message:
