@@ -105,6 +105,16 @@ def _triple(values: Sequence[float] | Array) -> rs.Vec3:
     return x, y, z
 
 
+def polygons(solid: rs.Convex, turned: rs.Frame) -> rs.Mesh:
+    """The faces of `solid`, four-sided each, as triangles in another frame."""
+    to_world = np.array([turned.x, turned.y, turned.z])
+    corners = np.array(solid.vertices) @ to_world + np.array(turned.origin)
+    return rs.Mesh(
+        vertices=tuple(map(tuple, corners.tolist())),
+        triangles=tuple(t for a, b, c, d in solid.faces for t in ((a, b, c), (a, c, d))),
+    )
+
+
 # --- rays -----------------------------------------------------------------------------------------
 
 
@@ -158,3 +168,22 @@ def fresnel(cos_theta_i: Array, n_from: float, n_to: float) -> Array:
     s = (n_from * cos_theta_i - n_to * cos_t) / (n_from * cos_theta_i + n_to * cos_t)
     p = (n_to * cos_theta_i - n_from * cos_t) / (n_to * cos_theta_i + n_from * cos_t)
     return np.where(sin2_t >= 1, 1.0, (s**2 + p**2) / 2)
+
+
+def through_ball(
+    ball: rs.Sphere, origins: Array, directions: Array, outside: float, inside: float
+) -> tuple[Array, Array]:
+    center = np.array(ball.center)
+    first = on_sphere(origins, directions, ball, far=False)
+    inner = refract(directions, (first - center) / ball.radius, outside, inside)
+    second = on_sphere(first, inner, ball, far=True)
+    return second, refract(inner, (center - second) / ball.radius, inside, outside)
+
+
+# --- what many tests look at and from where ------------------------------------------------------
+
+N = GLASS.ior
+BALL = rs.Sphere(center=(0, 0, 0), radius=1)
+BEHIND = rectangle((0.1, 0, -3), (16, 16))
+PERSPECTIVE = camera((0.3, 0.4, 6), (0.5, -0.2, -3), 33)
+TILTED = rectangle((0.5, -0.2, -3), (6, 4), z=(0.3, -0.2, 1), up=(0.2, 1, 0))
