@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracer.errors import SceneError
-from tracer.mesh import Mesh, Tree, grow_tree, require_closed
+from tracer.mesh import LEFT, RIGHT, WORDS, Mesh, Tree, grow_tree, require_closed
 from tracer.patterns import Constant, Picture, pattern_row
 from tracer.scene import (
     VACUUM,
@@ -48,8 +48,8 @@ class Arrays(NamedTuple):
     texels: Floats
     lights: Floats  # (l, 6): position, intensity
     background: Floats  # (1, 3)
-    boxes: NDArray[np.float32]  # nodes of all meshes' trees
-    children: NDArray[np.int32]
+    nodes: NDArray[np.float32]  # of all meshes' trees
+    links: NDArray[np.int32]  # the same memory
     triangles: Floats
     normals: Floats
 
@@ -143,12 +143,11 @@ class _Flattener:
 
     def _tree(self, tree: Tree) -> int:
         """Moves a tree behind the ones that are there; returns the row of its first normal."""
-        inner = tree.children >= 0
-        tree.children[inner] += self.nodes
-        tree.children[~inner] -= 8 * self.triangles
+        children = tree.links[:, LEFT : RIGHT + 1]
+        children += np.where(children >= 0, self.nodes, -8 * self.triangles).astype(np.int32)
         first_normal = self.normals if len(tree.normals) else -1
         self.trees.append(tree)
-        self.nodes += len(tree.boxes)
+        self.nodes += len(tree.nodes)
         self.triangles += len(tree.triangles)
         self.normals += len(tree.normals)
         return first_normal
@@ -171,6 +170,7 @@ def flatten(scene: Scene) -> Arrays:
     for surface in scene.surfaces:
         into.surface(surface)
     trees = into.trees or [_NO_TREE]
+    nodes = np.concatenate([tree.nodes for tree in trees])
     return Arrays(
         objects=np.array(into.objects, np.int64).reshape(-1, 8),
         balls=_table(into.balls, 4),
@@ -181,13 +181,11 @@ def flatten(scene: Scene) -> Arrays:
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([[*light.position, *light.intensity] for light in scene.lights], 6),
         background=_table([list(scene.background)], 3),
-        boxes=np.concatenate([tree.boxes for tree in trees]),
-        children=np.concatenate([tree.children for tree in trees]),
+        nodes=nodes,
+        links=nodes.view(np.int32),
         triangles=np.concatenate([tree.triangles for tree in trees]),
         normals=np.concatenate([tree.normals for tree in trees]),
     )
 
 
-_NO_TREE = Tree(
-    np.empty((0, 12), np.float32), np.empty((0, 2), np.int32), np.empty((0, 9)), np.empty((0, 9))
-)
+_NO_TREE = Tree(np.empty((0, WORDS), np.float32), np.empty((0, 9)), np.empty((0, 9)))

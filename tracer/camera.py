@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import compiled
+from tracer.compiled import inlined
 from tracer.vector import Vec, along, normalise
 
 PERSPECTIVE, ORTHOGRAPHIC = 0.0, 1.0
@@ -46,7 +46,7 @@ def camera_row(camera: Perspective | Orthographic, width: int, height: int) -> N
     return np.array([kind, *camera.origin, *camera.forward, *right, *up])
 
 
-@compiled
+@inlined
 def primary_ray(row: NDArray[np.float64], x: float, y: float) -> tuple[Vec, Vec]:
     """(origin, direction) through the film at x, y in [-1, 1], x to the right and y up."""
     origin = (row[1], row[2], row[3])
@@ -58,7 +58,7 @@ def primary_ray(row: NDArray[np.float64], x: float, y: float) -> tuple[Vec, Vec]
     return origin, normalise(along(along(forward, x, right), y, up))
 
 
-@compiled
+@inlined
 def pixel_centre(i: int, j: int, width: int, height: int) -> tuple[float, float]:
     """Film coordinates of the centre of the pixel in column i, row j; row 0 is at the top."""
     return 2.0 * (i + 0.5) / width - 1.0, 1.0 - 2.0 * (j + 0.5) / height

@@ -14,6 +14,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+_numba: Any = numba  # its own types cover little of it
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -32,11 +33,40 @@ def compiled(function: Function) -> Function:
     """Compiles `function` on its first call, and keeps the result on disk.
 
     IEEE arithmetic as written (no fast-math, no fused multiply-add): the same bits everywhere.
-    The interpreter lock is released, so threads run kernels side by side. With the environment
-    variable ``NUMBA_DISABLE_JIT=1`` it stays a Python function, for debuggers and coverage.
+    The interpreter lock is released, so threads run side by side. Arrays are only borrowed: there
+    is no reference counting, which threads would fight over, so none can be made inside either.
+    With the environment variable ``NUMBA_DISABLE_JIT=1`` it stays a Python function, for
+    debuggers and coverage.
     """
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    cache = getattr(dispatcher, "_cache", None)
-    if cache is not None:
-        cache._cache_file._source_stamp = _STAMP
+    return _compiled(function, forceinline=True)
+
+
+def inlined(function: Function) -> Function:
+    """As `compiled`, for parts of compiled functions; Python cannot call it.
+
+    That saves the code that unpacks Python's arguments. It is merged into its callers, because
+    a scene's arrays are a hundred arguments, too many to pass for every ray.
+    """
+    return _compiled(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def called(function: Function) -> Function:
+    """As `inlined`, for what is too large or too rare to be merged into its callers."""
+    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def _compiled(function: Function, **options: bool) -> Function:
+    options |= {"cache": True, "nogil": True, "_nrt": False}
+    dispatcher = _numba.njit(error_model="numpy", **options)(function)
+    if hasattr(dispatcher, "py_func"):
+        dispatcher._cache._cache_file._source_stamp = _STAMP
+        specialise = dispatcher.compile
+
+        def compile_once(signature: Any) -> Any:
+            """Not anew for every constant that a caller passes, which Numba takes for a type."""
+            if isinstance(signature, tuple):
+                signature = tuple(_numba.types.unliteral(argument) for argument in signature)
+            return specialise(signature)
+
+        dispatcher.compile = compile_once
     return cast(Function, dispatcher)

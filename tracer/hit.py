@@ -16,7 +16,7 @@ from tracer.arrays import (
     Arrays,
     Floats,
 )
-from tracer.compiled import compiled
+from tracer.compiled import inlined
 from tracer.mesh import STACK, mesh_hit, smooth_normal, triangle_normal
 from tracer.shapes import (
     INF,
@@ -31,13 +31,12 @@ from tracer.vector import Vec, along, dot, normalise, scale, sub
 NOTHING = -1
 
 
-@compiled
 def new_stack() -> Floats:
     """Room for walking down meshes' trees; one per thread."""
     return np.empty((STACK, 2))
 
 
-@compiled
+@inlined
 def nearest_hit(
     scene: Arrays,
     o: Vec,
@@ -58,7 +57,11 @@ def nearest_hit(
         kind = scene.objects[i, SHAPE]
         on_face = left_face if i == left else -1
         if kind == MESH:
-            t, face, entering = _mesh_hit(scene, i, o, d, on_face, inward, best, stack)
+            root, side = scene.objects[i, FIRST], -1 if inward else 1
+            t, face, side = mesh_hit(
+                o, d, scene.nodes, scene.links, scene.triangles, root, on_face, side, best, stack
+            )
+            entering = side > 0
         elif on_face >= 0 and not (inward and kind <= CELL):
             continue  # nothing of a convex solid lies outwards; a face is not met twice
         elif kind == SPHERE:
@@ -76,7 +79,7 @@ def nearest_hit(
 # Where on_face >= 0, it has just left that face of the object and heads inwards.
 
 
-@compiled
+@inlined
 def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
     row = scene.objects[i, FIRST]
     center, radius = vec_at(scene.rows, row, 0), scene.rows[row, 3]
@@ -88,7 +91,7 @@ def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[fl
     return (leave if leave > 0.0 else INF), 0, False
 
 
-@compiled
+@inlined
 def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
     if on_face < 0:
         to_center = sub(vec_at(scene.balls, i, 0), o)
@@ -107,40 +110,14 @@ def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[floa
     return leave, face_out, False
 
 
-@compiled
-def _mesh_hit(
-    scene: Arrays,
-    i: int,
-    o: Vec,
-    d: Vec,
-    on_face: int,
-    inward: bool,
-    best: float,
-    stack: Floats,
-) -> tuple[float, int, bool]:
-    t, triangle, side = mesh_hit(
-        o,
-        d,
-        scene.boxes,
-        scene.children,
-        scene.triangles,
-        scene.objects[i, FIRST],
-        on_face,
-        -1 if inward else 1,
-        best,
-        stack,
-    )
-    return t, triangle, side > 0
-
-
-@compiled
+@inlined
 def _face_hit(scene: Arrays, i: int, o: Vec, d: Vec, is_disk: bool) -> tuple[float, int, bool]:
     row = scene.objects[i, FIRST]
     entering = dot(d, vec_at(scene.rows, row, 9)) < 0.0
     return face_distance(o, d, scene.rows, row, is_disk), 0, entering
 
 
-@compiled
+@inlined
 def hit_point(
     scene: Arrays, o: Vec, t: float, d: Vec, hit: int, face: int, entering: bool
 ) -> tuple[Vec, Vec, Vec]:

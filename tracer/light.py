@@ -14,13 +14,13 @@ from tracer.arrays import (
     Arrays,
     Floats,
 )
-from tracer.compiled import compiled
+from tracer.compiled import called, inlined
 from tracer.hit import hit_point, nearest_hit
 from tracer.shapes import vec_at
 from tracer.vector import Vec, add, dot, mul, scale, sub
 
 
-@compiled
+@inlined
 def absorbed(media: Floats, medium: int, length: float) -> Vec:
     """Beer-Lambert: what is left of each colour after `length` in a medium."""
     a = vec_at(media, medium, 1)
@@ -33,7 +33,7 @@ def absorbed(media: Floats, medium: int, length: float) -> Vec:
     )
 
 
-@compiled
+@called
 def unshadowed(
     scene: Arrays,
     o: Vec,
@@ -68,7 +68,7 @@ def unshadowed(
         left, left_face, inward = hit, face, entering
 
 
-@compiled
+@called
 def lambertian(
     scene: Arrays,
     reflectance: Vec,

@@ -11,17 +11,21 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import compiled
+from tracer.compiled import called, compiled, inlined
 from tracer.errors import SceneError
 from tracer.vector import Vec, add, cross, dot, normalise, scale, sub
 
 Floats = NDArray[np.float64]
 Boxes = NDArray[np.float32]
-Ints = NDArray[np.int32]
+Ints = NDArray[np.int64]
+Ints32 = NDArray[np.int32]
+Indices = tuple[int, int, int]
 
+INF = np.inf
 LEAF = 4  # triangles at most in a leaf
 BINS = 16
 DEEP = 48  # below this level ranges are halved, which bounds the tree's height
+EMPTY_LEAF = -1
 STACK = 96  # > DEEP + log2 of any number of triangles that fits in memory
 
 
@@ -79,143 +83,177 @@ def require_closed(mesh: Mesh, name: str) -> None:
 
 
 # --- building the tree ----------------------------------------------------------------------------
-# A node holds the boxes of its two children, in float32 and rounded outwards, and where they are:
-# another node, or as -1 - (8 first + count) a leaf.
+# A node is 16 words of 4 bytes, one line of cache: the boxes of its two children in float32,
+# rounded outwards (least x, y, z, most x, y, z each), and as integers in columns LEFT and RIGHT
+# where they are: the row of another node, or as -1 - (8 first + count) a leaf's triangles.
+
+LEFT, RIGHT, WORDS = 12, 13, 16
 
 
-@compiled
-def _grow(boxes: Floats, order: Ints, begin: int, end: int, box: Floats) -> None:
-    """The box around triangles order[begin:end], into box[0:6]."""
-    box[0:3] = np.inf
-    box[3:6] = -np.inf
-    for i in range(begin, end):
-        for k in range(3):
-            box[k] = min(box[k], boxes[order[i], k])
-            box[3 + k] = max(box[3 + k], boxes[order[i], 3 + k])
+@inlined
+def _clear(box: Floats) -> None:
+    for k in range(3):
+        box[k], box[3 + k] = INF, -INF
 
 
-@compiled
+@inlined
+def _include(box: Floats, other: Floats) -> None:
+    for k in range(3):
+        if other[k] < box[k]:
+            box[k] = other[k]
+        if other[3 + k] > box[3 + k]:
+            box[3 + k] = other[3 + k]
+
+
+@inlined
 def _half_area(box: Floats) -> float:
     x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
     return x * y + y * z + z * x if x >= 0.0 else 0.0
 
 
-@compiled
-def _split(
-    boxes: Floats, order: Ints, begin: int, end: int, bins: Floats, counts: Ints, halve: bool
-) -> int:
+@inlined
+def _middle(boxes: Floats, triangle: int, axis: int) -> float:
+    """Twice the middle of its box, to be exact."""
+    return float(boxes[triangle, axis] + boxes[triangle, 3 + axis])
+
+
+@called
+def _split(boxes: Floats, order: Ints, begin: int, end: int, bins: Floats, halve: bool) -> int:
     """Sorts order[begin:end] into two parts of least surface area cost; where the second starts.
 
     I. Wald, On fast construction of SAH-based bounding volume hierarchies, 2007.
     """
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for i in range(begin, end):
-        for k in range(3):
-            middle = boxes[order[i], k] + boxes[order[i], 3 + k]
-            low[k] = min(low[k], middle)
-            high[k] = max(high[k], middle)
-    axis = int(np.argmax(high - low))
-    extent = high[axis] - low[axis]
-    if halve or not extent > 0.0:
+    axis, low, extent = 0, 0.0, 0.0
+    for k in range(3):
+        least, most = INF, -INF
+        for i in range(begin, end):
+            middle = _middle(boxes, order[i], k)
+            least, most = min(least, middle), max(most, middle)
+        if most - least > extent:
+            axis, low, extent = k, least, most - least
+    if halve or extent == 0.0:
         return (begin + end) // 2
 
     to_bin = BINS * (1.0 - 1e-9) / extent
-    counts[:] = 0
-    bins[:, 0:3] = np.inf
-    bins[:, 3:6] = -np.inf
+    for k in range(BINS):
+        _clear(bins[k])
+        bins[k, 6] = 0.0
     for i in range(begin, end):
-        t = order[i]
-        bin_ = int((boxes[t, axis] + boxes[t, 3 + axis] - low[axis]) * to_bin)
-        counts[bin_] += 1
-        for k in range(3):
-            bins[bin_, k] = min(bins[bin_, k], boxes[t, k])
-            bins[bin_, 3 + k] = max(bins[bin_, 3 + k], boxes[t, 3 + k])
-
-    cost = np.zeros(BINS)
-    for backwards in range(2):
-        around = np.array([np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf])
-        n = 0
-        for step in range(BINS - 1):
-            bin_ = BINS - 1 - step if backwards else step
-            n += counts[bin_]
-            for k in range(3):
-                around[k] = min(around[k], bins[bin_, k])
-                around[3 + k] = max(around[3 + k], bins[bin_, 3 + k])
-            cost[bin_ if backwards else bin_ + 1] += n * _half_area(around)
-    best = 1 + int(np.argmin(cost[1:]))
+        k = int((_middle(boxes, order[i], axis) - low) * to_bin)
+        bins[k, 6] += 1.0
+        _include(bins[k], boxes[order[i]])
+    best = _cheapest(bins)
 
     i, j = begin, end - 1
     while i <= j:
-        t = order[i]
-        if int((boxes[t, axis] + boxes[t, 3 + axis] - low[axis]) * to_bin) < best:
+        triangle = order[i]
+        if int((_middle(boxes, triangle, axis) - low) * to_bin) < best:
             i += 1
         else:
-            order[i], order[j] = order[j], t
+            order[i], order[j] = order[j], triangle
             j -= 1
-    return i if begin < i < end else (begin + end) // 2
+    return i
+
+
+@called
+def _cheapest(bins: Floats) -> int:
+    """The bin before which to split. Columns of `bins`: box, count, cost; one row is scratch."""
+    around = bins[BINS]
+    for backwards in range(2):
+        _clear(around)
+        n = 0.0
+        for step in range(1, BINS):
+            k = BINS - step if backwards else step - 1
+            n += bins[k, 6]
+            _include(around, bins[k])
+            cost = n * _half_area(around)
+            if backwards:
+                bins[k, 7] += cost
+            else:
+                bins[k + 1, 7] = cost
+    best = 1
+    for k in range(2, BINS):
+        if bins[k, 7] < bins[best, 7]:
+            best = k
+    return best
 
 
 @compiled
-def build_tree(boxes: Floats) -> tuple[Ints, Floats, Ints]:
-    """(order, node boxes (N, 12), children (N, 2)) over triangles with bounding `boxes` (T, 6)."""
+def _build(boxes: Floats, order: Ints, nodes: Floats, tasks: Ints, bins: Floats) -> int:
+    """Sorts triangles with bounding `boxes` (T, 6) into a tree; the number of its nodes.
+
+    Fills `order` (T,) and the first `nodes` (T, 16), not yet packed. The rest is scratch: `tasks`
+    (2 STACK, 4) and `bins` (BINS + 1, 8).
+    """
     total = len(boxes)
-    order = np.arange(total).astype(np.int32)
-    node_boxes = np.empty((max(total, 1), 12))
-    children = np.empty((max(total, 1), 2), np.int32)
-    tasks = np.empty((2 * STACK, 4), np.int64)  # node, begin, end, level
-    bins, counts = np.empty((BINS, 6)), np.empty(BINS, np.int32)
-    nodes, waiting = 1, 1
-    tasks[0] = 0, 0, total, 0
-    while waiting:
+    for i in range(total):
+        order[i] = i
+    count, waiting = 1, 1
+    tasks[0, 0], tasks[0, 1], tasks[0, 2], tasks[0, 3] = 0, 0, total, 0
+    while waiting > 0:
         waiting -= 1
-        node, begin, end, level = tasks[waiting]
-        middle = (
-            end if total <= LEAF else _split(boxes, order, begin, end, bins, counts, level >= DEEP)
-        )
+        node, begin = tasks[waiting, 0], tasks[waiting, 1]
+        end, level = tasks[waiting, 2], tasks[waiting, 3]
+        middle = end
+        if total > LEAF:
+            middle = _split(boxes, order, begin, end, bins, level >= DEEP)
         for side in range(2):
             first, last = (begin, middle) if side == 0 else (middle, end)
-            _grow(boxes, order, first, last, node_boxes[node, 6 * side : 6 * side + 6])
+            box = nodes[node, 6 * side : 6 * side + 6]
+            _clear(box)
+            for i in range(first, last):
+                _include(box, boxes[order[i]])
             if last - first <= LEAF:
-                children[node, side] = -1 - (8 * first + (last - first))
+                nodes[node, LEFT + side] = -1 - (8 * first + (last - first))
                 continue
-            children[node, side] = nodes
-            tasks[waiting] = nodes, first, last, level + 1
-            nodes += 1
+            nodes[node, LEFT + side] = count
+            tasks[waiting, 0], tasks[waiting, 1] = count, first
+            tasks[waiting, 2], tasks[waiting, 3] = last, level + 1
+            count += 1
             waiting += 1
-    return order, node_boxes[:nodes], children[:nodes]
+    return count
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """What the kernels read: triangles in the order of the tree's leaves."""
+    """What the kernels read: nodes, and triangles in the order of the tree's leaves."""
 
-    boxes: Boxes  # (N, 12)
-    children: Ints  # (N, 2)
+    nodes: NDArray[np.float32]  # (N, 16)
     triangles: Floats  # (T, 9): three vertices each
     normals: Floats  # (T, 9) or (0, 9)
 
+    @property
+    def links(self) -> NDArray[np.int32]:
+        """The same memory as `nodes`, read as integers."""
+        return self.nodes.view(np.int32)
+
 
 def grow_tree(mesh: Mesh) -> Tree:
+    """A tree over the triangles of a mesh, in about a microsecond per triangle."""
     corners = mesh.vertices[mesh.triangles]
-    bounds = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    order, boxes, children = build_tree(np.ascontiguousarray(bounds))
-    rounded = boxes.astype(np.float32)
-    outwards = np.repeat(np.array([-np.inf, np.inf] * 2, np.float32), 3)
+    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
+    total = len(boxes)
+    order, nodes = np.empty(total, np.int64), np.empty((total, WORDS))
+    count = _build(boxes, order, nodes, np.empty((2 * STACK, 4), np.int64), np.empty((BINS + 1, 8)))
+    packed = np.zeros((count, WORDS), np.float32)
+    outwards = np.repeat(np.array([-INF, INF, -INF, INF], np.float32), 3)
+    packed[:, :LEFT] = np.nextafter(nodes[:count, :LEFT].astype(np.float32), outwards)
+    packed.view(np.int32)[:, LEFT : RIGHT + 1] = nodes[:count, LEFT : RIGHT + 1]
     normals = np.empty((0, 9))
     if mesh.normals is not None:
         normals = mesh.normals[mesh.triangles[order]].reshape(-1, 9)
-    return Tree(np.nextafter(rounded, outwards), children, corners[order].reshape(-1, 9), normals)
+    return Tree(packed, corners[order].reshape(-1, 9), normals)
 
 
 # --- tracing --------------------------------------------------------------------------------------
 
 
-@compiled
+@inlined
 def corner(table: Floats, triangle: int, k: int) -> Vec:
     return table[triangle, 3 * k], table[triangle, 3 * k + 1], table[triangle, 3 * k + 2]
 
 
-@compiled
+@inlined
 def triangle_distance(o: Vec, d: Vec, triangles: Floats, triangle: int) -> tuple[float, int]:
     """(distance, side): side +1 where the ray comes from outside, -1 from inside, 0 if missed.
 
@@ -234,26 +272,32 @@ def triangle_distance(o: Vec, d: Vec, triangles: Floats, triangle: int) -> tuple
     return dot(n, a) / dot(n, d), 1 if outside else -1
 
 
-@compiled
-def _box_distance(o: Vec, inverse: Vec, boxes: Boxes, node: int, at: int, t_max: float) -> float:
-    """Where the ray enters a child's box, infinite where it misses. NaN (0/0) is passed over."""
-    enter, leave = 0.0, t_max
+@inlined
+def _box_distance(
+    o: Vec, inverse: Vec, near: Indices, far: Indices, nodes: Boxes, node: int, at: int, best: float
+) -> float:
+    """Where the ray enters the box at column `at` of a node; infinite where it does not.
+
+    `near` and `far` tell which of its six faces the ray meets first and last along each axis. A
+    face in whose plane the ray lies gives 0/0, NaN, which loses both comparisons.
+    """
+    enter, leave = 0.0, best
     for k in range(3):
-        near = (boxes[node, at + k] - o[k]) * inverse[k]
-        far = (boxes[node, at + 3 + k] - o[k]) * inverse[k]
-        if near > far:
-            near, far = far, near
-        enter = max(enter, near) if near == near else enter
-        leave = min(leave, far) if far == far else leave
-    return enter if enter <= leave else np.inf
+        first = (nodes[node, at + near[k]] - o[k]) * inverse[k]
+        last = (nodes[node, at + far[k]] - o[k]) * inverse[k]
+        if first > enter:
+            enter = first
+        if last < leave:
+            leave = last
+    return enter if enter <= leave else INF
 
 
-@compiled
+@called
 def mesh_hit(
     o: Vec,
     d: Vec,
-    boxes: Boxes,
-    children: Ints,
+    nodes: Boxes,
+    links: Ints32,
     triangles: Floats,
     root: int,
     on_face: int,
@@ -269,31 +313,29 @@ def mesh_hit(
     best, hit, hit_side = t_max, -1, 0
     t_min = 0.0 if on_face < 0 else -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
     inverse = (1.0 / d[0], 1.0 / d[1], 1.0 / d[2])
+    near = (0 if d[0] >= 0.0 else 3, 1 if d[1] >= 0.0 else 4, 2 if d[2] >= 0.0 else 5)
+    far = (3 - near[0], 5 - near[1], 7 - near[2])
     height, node = 0, root
     while True:
-        if node >= 0:
-            t0 = _box_distance(o, inverse, boxes, node, 0, best)
-            t1 = _box_distance(o, inverse, boxes, node, 6, best)
-            near, far = children[node, 0], children[node, 1]
+        while node >= 0:
+            t0 = _box_distance(o, inverse, near, far, nodes, node, 0, best)
+            t1 = _box_distance(o, inverse, near, far, nodes, node, 6, best)
+            first, second = links[node, LEFT], links[node, RIGHT]
             if t1 < t0:
-                t0, t1 = t1, t0
-                near, far = far, near
-            if t1 < np.inf:
-                stack[height, 0], stack[height, 1] = t1, far
+                t0, t1, first, second = t1, t0, second, first
+            if t1 < INF:
+                stack[height, 0], stack[height, 1] = t1, second
                 height += 1
-            if t0 < np.inf:
-                node = near
+            node = first if t0 < INF else EMPTY_LEAF
+        leaf = -1 - node
+        for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
+            if triangle == on_face:
                 continue
-        else:
-            leaf = -1 - node
-            for triangle in range(leaf // 8, leaf // 8 + leaf % 8):
-                if triangle == on_face:
-                    continue
-                t, from_side = triangle_distance(o, d, triangles, triangle)
-                if from_side == 0 or (on_face >= 0 and from_side != side):
-                    continue
-                if t < best and (t > 0.0 or (on_face >= 0 and t >= t_min)):
-                    best, hit, hit_side = max(t, 0.0), triangle, from_side
+            t, from_side = triangle_distance(o, d, triangles, triangle)
+            if from_side == 0 or (on_face >= 0 and from_side != side):
+                continue
+            if t < best and (t > 0.0 or (on_face >= 0 and t >= t_min)):
+                best, hit, hit_side = max(t, 0.0), triangle, from_side
         while height > 0 and stack[height - 1, 0] > best:
             height -= 1
         if height == 0:
@@ -302,14 +344,14 @@ def mesh_hit(
         node = int(stack[height, 1])
 
 
-@compiled
+@inlined
 def triangle_normal(triangles: Floats, triangle: int) -> Vec:
     a = corner(triangles, triangle, 0)
     ab, ac = sub(corner(triangles, triangle, 1), a), sub(corner(triangles, triangle, 2), a)
     return normalise(cross(ab, ac))
 
 
-@compiled
+@called
 def smooth_normal(p: Vec, triangles: Floats, triangle: int, normals: Floats, row: int) -> Vec:
     """The normals of the corners, weighted by the barycentric coordinates of `p`."""
     a, b, c = (

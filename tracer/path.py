@@ -19,7 +19,7 @@ from tracer.arrays import (
     Floats,
     flatten,
 )
-from tracer.compiled import compiled
+from tracer.compiled import compiled, inlined
 from tracer.errors import SceneError
 from tracer.hit import NOTHING, hit_point, nearest_hit, new_stack
 from tracer.optics import reflect
@@ -59,12 +59,12 @@ class Paths:
     vertices: Floats | None = None
 
 
-@compiled
+@inlined
 def _put(table: Floats, row: int, v: Vec) -> None:
     table[row, 0], table[row, 1], table[row, 2] = v[0], v[1], v[2]
 
 
-@compiled
+@inlined
 def _take(
     scene: Arrays,
     hit: int,
@@ -106,7 +106,7 @@ def _take(
     return MISS, p, d, 1.0, 0.0
 
 
-@compiled
+@inlined
 def _follow_one(
     scene: Arrays,
     o: Vec,
@@ -154,7 +154,7 @@ def _follow_one(
         left, left_face, inward = hit, face, entering == transmit
 
 
-@compiled
+@inlined
 def _keep(vertices: Floats, corners: int, p: Vec) -> int:
     """Writes a vertex where vertices are asked for; the number of vertices so far."""
     if corners < len(vertices):
@@ -179,8 +179,8 @@ def _follow(
     weight: Floats,
     optical: Floats,
     vertices: NDArray[np.float64],
+    stack: Floats,
 ) -> None:
-    stack = new_stack()
     for i in range(begin, end):
         o = (origins[i, 0], origins[i, 1], origins[i, 2])
         d = (directions[i, 0], directions[i, 1], directions[i, 2])
@@ -244,6 +244,7 @@ def follow(
             found.weight,
             found.optical_length,
             ways,
+            new_stack(),
         )
 
     for_bands(some, n, BAND, threads)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import compiled
+from tracer.compiled import called
 from tracer.shapes import vec_at
 from tracer.vector import Vec
 
@@ -71,7 +71,7 @@ def pattern_row(pattern: Pattern, first_texel: int) -> list[float]:
             return [PICTURE, first_texel, width, height]
 
 
-@compiled
+@called
 def pattern_radiance(
     rows: NDArray[np.float64], row: int, texels: NDArray[np.float64], u: float, v: float
 ) -> Vec:

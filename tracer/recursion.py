@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tracer.arrays import Arrays, Floats, flatten
 from tracer.camera import camera_row, pixel_centre, primary_ray
-from tracer.compiled import compiled
+from tracer.compiled import compiled, inlined
 from tracer.hit import NOTHING, nearest_hit, new_stack
 from tracer.light import absorbed
 from tracer.scene import Scene
@@ -50,7 +50,7 @@ class Waiting(NamedTuple):
     ints: NDArray[np.int64]  # (depth, 5): segments, medium, left, left_face, inward
 
 
-@compiled
+@inlined
 def _push(
     waiting: Waiting,
     at: int,
@@ -72,7 +72,7 @@ def _push(
     ints[at, 3], ints[at, 4] = left_face, inward
 
 
-@compiled
+@inlined
 def radiance(
     scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
 ) -> tuple[Vec, float]:
@@ -145,13 +145,12 @@ def _render_rows(
     camera: Floats,
     begin: int,
     end: int,
+    waiting: Waiting,
+    stack: Floats,
     pixels: Floats,
     cut: Floats,
 ) -> None:
     height, width = cut.shape
-    depth = limits.max_depth + 1
-    waiting = Waiting(np.empty((depth, 9)), np.empty((depth, 5), np.int64))
-    stack = new_stack()
     for j in range(begin, end):
         for i in range(width):
             x, y = pixel_centre(i, j, width, height)
@@ -175,7 +174,11 @@ def render(scene: Scene, width: int, height: int, threads: int | None = None) ->
     image = Render(np.empty((height, width, 3)), np.empty((height, width)))
 
     def rows(begin: int, end: int) -> None:
-        _render_rows(arrays, limits, lobes, camera, begin, end, image.pixels, image.cut)
+        depth = transport.max_depth + 1
+        waiting = Waiting(np.empty((depth, 9)), np.empty((depth, 5), np.int64))
+        _render_rows(
+            arrays, limits, lobes, camera, begin, end, waiting, new_stack(), image.pixels, image.cut
+        )
 
     for_bands(rows, height, BAND, threads)
     return image

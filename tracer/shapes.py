@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import compiled
+from tracer.compiled import called, inlined
 from tracer.errors import SceneError
 from tracer.vector import Vec, along, dot, normalise, scale, sub
 
@@ -128,7 +128,7 @@ def face_row(face: Rectangle | Disk) -> list[float]:
     return [*face.origin, *face.x, *face.y, *face.z, *half]
 
 
-@compiled
+@inlined
 def vec_at(rows: Rows, row: int, column: int) -> Vec:
     return rows[row, column], rows[row, column + 1], rows[row, column + 2]
 
@@ -139,7 +139,7 @@ def vec_at(rows: Rows, row: int, column: int) -> Vec:
 EMPTY = (INF, -INF)
 
 
-@compiled
+@inlined
 def sphere_stretch(o: Vec, d: Vec, center: Vec, radius: float) -> tuple[float, float]:
     """Computed from the point of the ray next to the centre, which keeps far spheres exact.
 
@@ -156,7 +156,7 @@ def sphere_stretch(o: Vec, d: Vec, center: Vec, radius: float) -> tuple[float, f
     return nearest - half_chord, nearest + half_chord
 
 
-@compiled
+@inlined
 def plane_stretch(o: Vec, d: Vec, normal: Vec, offset: float) -> tuple[float, float]:
     approach = dot(normal, d)
     height = offset - dot(normal, o)
@@ -169,7 +169,7 @@ def plane_stretch(o: Vec, d: Vec, normal: Vec, offset: float) -> tuple[float, fl
     return INF, -INF
 
 
-@compiled
+@called
 def quadric_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[float, float]:
     """`on_it` says that `o` lies on the surface and `d` points inwards: one root is t = 0."""
     axis = vec_at(rows, row, 4)
@@ -209,7 +209,7 @@ def quadric_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[
     return shift + t0, shift + t1
 
 
-@compiled
+@inlined
 def cell_stretch(
     o: Vec, d: Vec, rows: Rows, first: int, count: int, on_face: int
 ) -> tuple[float, int, float, int]:
@@ -235,7 +235,7 @@ def cell_stretch(
     return enter, enter_face, leave, leave_face
 
 
-@compiled
+@inlined
 def face_distance(o: Vec, d: Vec, rows: Rows, row: int, is_disk: bool) -> float:
     """Distance to a rectangle or disk, from either side; infinite where it is missed."""
     z = vec_at(rows, row, 9)
@@ -255,7 +255,7 @@ def face_distance(o: Vec, d: Vec, rows: Rows, row: int, is_disk: bool) -> float:
 # --- their outward normals ------------------------------------------------------------------------
 
 
-@compiled
+@inlined
 def bound_normal(p: Vec, rows: Rows, row: int) -> Vec:
     if rows[row, 0] == PLANE:
         return vec_at(rows, row, 1)
@@ -268,7 +268,7 @@ def bound_normal(p: Vec, rows: Rows, row: int) -> Vec:
     return normalise(gradient)
 
 
-@compiled
+@inlined
 def face_coordinates(p: Vec, rows: Rows, row: int) -> tuple[float, float]:
     """Texture coordinates (u, v) of a point on a rectangle or disk, each in [0, 1]."""
     from_center = sub(p, vec_at(rows, row, 0))

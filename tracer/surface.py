@@ -20,7 +20,7 @@ from tracer.arrays import (
     Arrays,
     Floats,
 )
-from tracer.compiled import compiled
+from tracer.compiled import called, inlined
 from tracer.hit import hit_point
 from tracer.light import absorbed, lambertian
 from tracer.optics import (
@@ -66,7 +66,7 @@ class Scattered(NamedTuple):
     crossed: int
 
 
-@compiled
+@inlined
 def _interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float, Vec, Vec]:
     cos_theta_i = max(0.0, dot(wi, n))
     transmits, cos_theta_t = cos_transmitted(cos_theta_i, ior_i, ior_t)
@@ -77,7 +77,7 @@ def _interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float
     return True, R, wr, transmitted(wi, n, cos_theta_i, cos_theta_t, ior_i / ior_t)
 
 
-@compiled
+@inlined
 def interface(
     wi: Vec, shading: Vec, geometric: Vec, ior_i: float, ior_t: float
 ) -> tuple[bool, float, Vec, Vec]:
@@ -92,7 +92,7 @@ def interface(
     return transmits, R, wr, wt
 
 
-@compiled
+@called
 def thin_slab(
     scene: Arrays, hit: int, p: Vec, d: Vec, n: Vec, entering: bool
 ) -> tuple[bool, float, Vec, Vec, float, float]:
@@ -114,7 +114,7 @@ def thin_slab(
     return True, R, wr, along(along(p, -back, d), inside, wt), inside, back
 
 
-@compiled
+@inlined
 def _slab_lobes(R: float, a: float, lobes: Lobes) -> tuple[float, float]:
     """(reflected, transmitted): with both lobes on, all internal reflections are in the sums."""
     if lobes.reflection and lobes.transmission:
@@ -124,7 +124,7 @@ def _slab_lobes(R: float, a: float, lobes: Lobes) -> tuple[float, float]:
     )
 
 
-@compiled
+@inlined
 def scatter(
     scene: Arrays,
     lobes: Lobes,

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracer import optics
@@ -102,6 +102,7 @@ unit_angles = st.floats(0.0, math.pi / 2 * 0.9999)
 indices = st.floats(1.0, 4.0)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(unit_angles, st.floats(0, 2 * math.pi), indices, indices)
 def test_both_derivations_of_the_lecture_agree(
     theta: float, phi: float, ior_i: float, ior_t: float
@@ -135,6 +136,7 @@ def test_factored_form_is_exact_where_the_usual_ones_are_not() -> None:
     assert abs(Fraction(usual) / exact - 1) > Fraction(1e-9)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(unit_angles, indices, indices)
 def test_total_internal_reflection_is_said_exactly_beyond_the_critical_angle(
     theta: float, ior_i: float, ior_t: float
@@ -154,6 +156,7 @@ def test_total_internal_reflection_is_said_exactly_beyond_the_critical_angle(
     assert transmits or R == 1.0
 
 
+@settings(deadline=None)  # the first call compiles
 @given(unit_angles, indices, indices)
 def test_light_goes_back_the_way_it_came(theta: float, ior_i: float, ior_t: float) -> None:
     n = (0.0, 0.0, 1.0)
@@ -214,6 +217,7 @@ def test_thin_slab_offset() -> None:
     assert optics.thin_slab_offset(math.radians(60), 1.0, 0.5) == (False, 0.0)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(unit_angles, st.floats(0.01, 10), st.floats(1.001, 4.0))
 def test_crossing_a_slab_shifts_by_the_closed_form(
     theta: float, thickness: float, ior: float
