@@ -14,6 +14,7 @@ import secrets
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO
@@ -58,9 +59,11 @@ class ProcessTree:
                     member.kill()  # psutil makes sure that the pid was not given to another
             if len(self._members) <= known:
                 break
-        # A killed process may still run for a moment; the root is for the caller to wait for.
-        others = [m for pid, m in self._members.items() if pid != self.process.pid]
-        psutil.wait_procs(others, timeout=2)
+        # A killed process may still run for a moment. The root is for the caller to wait for.
+        deadline = time.monotonic() + 2
+        for pid, member in self._members.items():
+            while pid != self.process.pid and _runs(member) and time.monotonic() < deadline:
+                time.sleep(0.002)
 
     def _find_members(self) -> None:
         pids = set(psutil.pids())
@@ -79,6 +82,13 @@ class ProcessTree:
             return bool(psutil.Process(pid).environ().get(TOKEN) == self._token)
         except (OSError, psutil.Error):
             return False
+
+
+def _runs(process: psutil.Process) -> bool:
+    try:
+        return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
+    except psutil.Error:
+        return False
 
 
 def spawn(

@@ -68,14 +68,18 @@ def leak_in_child(output: Path, width: int, height: int) -> None:
 
 
 def fork(output: Path, width: int, height: int) -> None:
-    """Answers, but leaves behind a child in a session of its own and one that holds the pipes."""
+    """Answers, but leaves children behind, each hard to find in its own way."""
     good(output, width, height)
     left = []
-    for leaves_session in (True, False):
+    for way in ("holds the pipes", "leaves the session", "leaves the group and its environment"):
         child = os.fork()
         if child == 0:
-            if leaves_session:
+            if way == "leaves the session":
                 os.setsid()
+            if way == "leaves the group and its environment":
+                os.setpgid(0, 0)
+                sleep = "import time; time.sleep(600)"
+                os.execve(sys.executable, [sys.executable, "-S", "-c", sleep], {})
             hang(output, width, height)
         left.append(child)
     (output.parent / "left.json").write_text(json.dumps(left))

@@ -42,6 +42,15 @@ def make() -> Iterator[object]:
         renderer.close()
 
 
+@pytest.fixture(scope="module")
+def bystander() -> Iterator[WorkerRenderer]:
+    """A worker that nothing may happen to."""
+    renderer = WorkerRenderer("bystander", "tests.fakes.engine:Plain")
+    renderer.version()
+    yield renderer
+    renderer.close()
+
+
 def misbehave(mode: str) -> Program:
     return Program((sys.executable, str(MISBEHAVE), "--persistent", mode))
 
@@ -244,10 +253,10 @@ def test_a_program_that_is_not_there(make) -> None:
         ("none", RendererFailed, "fake answered 'done'"),
     ],
 )
-def test_outside_workers(mode: str, kind: type[RendererError], message: str, make) -> None:
+def test_outside_workers(
+    mode: str, kind: type[RendererError], message: str, make, bystander: WorkerRenderer
+) -> None:
     renderer = make(misbehave(mode), capabilities=ALL)
-    bystander = make("Plain")
-    bystander.version()
     for _ in range(2):
         with pytest.raises(kind) as caught:
             renderer.render(SCENE, RenderSettings(memory_mb=200, timeout_s=20))
@@ -260,9 +269,8 @@ def test_a_good_outside_worker_that_leaves_children(make) -> None:
     assert renderer.render(SCENE, RenderSettings()).pixels[0, 0, 0] == 0.25
     members = renderer._child._tree
     members._find_members()
-    assert len(members._members) == 3
+    assert len(members._members) == 4
     renderer.close()
-    time.sleep(0.05)
     assert not any(is_running(pid) for pid in members._members)
 
 
@@ -315,16 +323,24 @@ def test_a_fork_has_a_worker_of_its_own(make) -> None:
     assert int(renderer.render(SCENE, RenderSettings()).pixels[0, 0, 0]) == mine
 
 
-def test_a_worker_does_not_outlive_a_killed_parent(tmp_path: Path) -> None:
-    code = (
-        "from harness.renderers.persistent import WorkerRenderer\n"
-        "import os, signal\n"
-        "r = WorkerRenderer('fake', 'tests.fakes.engine:Plain'); r.version()\n"
-        f"open({str(tmp_path / 'pid')!r}, 'w').write(str(r._child._tree.process.pid))\n"
-        "os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    root = Path(__file__).parents[2]
-    psutil.Popen([sys.executable, "-c", code], cwd=root).wait(60)
+@pytest.mark.parametrize("busy", [False, True])
+def test_a_worker_does_not_outlive_a_killed_parent(busy: bool, tmp_path: Path) -> None:
+    code = f"""
+import os, signal, threading, time
+from harness.renderers.base import RenderSettings
+from harness.renderers.persistent import WorkerRenderer
+from harness.renderers.proof import proof_scene
+r = WorkerRenderer("fake", "tests.fakes.engine:Faulty")
+r.version()
+if {busy}:
+    hang = RenderSettings(seed=2, timeout_s=600)
+    threading.Thread(target=r.render, args=(proof_scene(r.capabilities), hang)).start()
+    while not r._child.log():
+        time.sleep(0.01)
+open({str(tmp_path / "pid")!r}, "w").write(str(r._child._tree.process.pid))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+    psutil.Popen([sys.executable, "-c", code], cwd=Path(__file__).parents[2]).wait(60)
     worker = int((tmp_path / "pid").read_text())
     deadline = time.monotonic() + 10
     while is_running(worker) and time.monotonic() < deadline:
