@@ -67,6 +67,7 @@ def translate(scene: rs.ResolvedScene) -> PovScene:
     factor, bright = length_scale(scene), exposure(scene)
     writer = _Writer(scaled(scene, factor), bright)
     header = (
+        "// povray scene.ini\n"
         f"// lengths are multiplied by {_number(factor)}; "
         f"radiance is the image divided by {_number(bright)}\n"
     )

@@ -1,9 +1,8 @@
 """How a scene is fitted to what POV-Ray can hold: lengths to its hit floor, light to 16 bits.
 
 POV-Ray drops hits nearer than 1e-4 units and shadows nearer than 1e-3, whatever the scene's size,
-and stores bounding boxes and meshes in single precision. So lengths are multiplied by a power of
-two, which no number notices. Its 16-bit images clip at 1, so radiance is multiplied by the
-`exposure`, which is undone after reading.
+so lengths are multiplied by a power of two, which no number notices. Its 16-bit images clip at 1,
+so radiance is multiplied by the `exposure`, which is undone after reading.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from harness.scene.containment import signed_distance
 HIT_FLOOR = 1e-4
 SHADOW_FLOOR = 1e-3
 FAR = 1e7
-# Scenes are scaled to reach this far from the world's origin: the hit floor is then 1e-7 of the
-# scene, so that even rays near the edge of a prism are not lost, while a single precision
-# coordinate (half a spacing is 3e-5 here) stays below the floor.
-REACH = 1024.0
+# Scenes are scaled to reach this far from the world's origin: the hit floor is then 1.5e-9 of the
+# scene, so that hardly a ray is lost near the edges of prisms and slabs (at 1e-7 two of 65,536 in
+# the complete package were), and still 1e6 times what double precision rounds there.
+REACH = 65536.0
 # Nothing may be thinner than this many hit floors.
 FLOORS = 1000
 

@@ -75,7 +75,7 @@ def test_warnings_reach_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
     rewritten(monkeypatch, "max_trace_level 20", "max_trace_level 400")
     image: Image = PovRayRenderer().render(SIMPLE, SETTINGS)
     assert " ".join(image.log.split()) == (
-        "File 'scene.pov' line 6: Parse Warning: Maximum max_trace_level is 256 but 400 was "
+        "File 'scene.pov' line 7: Parse Warning: Maximum max_trace_level is 256 but 400 was "
         "specified. Going to use max_trace_level 256."
     )
 
