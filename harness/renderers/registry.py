@@ -112,7 +112,6 @@ def mitsuba_exact() -> Renderer:
 
 def _mitsuba(name: str, engine: str) -> Renderer:
     from harness.renderers.mitsuba_variants import child_environment
-
     from harness.renderers.persistent import WorkerRenderer
 
     target = f"harness.renderers.mitsuba:{engine}"
