@@ -47,7 +47,7 @@ def _planes_chord(planes: Float, o: Float, d: Float, chunk: int = 2_000_000) -> 
         rows = slice(start, start + step)
         slope = d[rows] @ planes[:, :3].T
         height = planes[:, 3] - o[rows] @ planes[:, :3].T
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = height / slope
         entering = np.where(slope < 0, t, np.where((slope == 0) & (height < 0), np.inf, -np.inf))
         leaving = np.where(slope > 0, t, np.inf)
@@ -66,7 +66,7 @@ def _cylinder_chord(cylinder: Cylinder, o: Float, d: Float) -> Chord:
     b = lo[:, 0] * ld[:, 0] + lo[:, 1] * ld[:, 1]
     cross = lo[:, 0] * ld[:, 1] - lo[:, 1] * ld[:, 0]
     h2 = a * cylinder.radius**2 - cross**2
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         h = np.sqrt(np.maximum(h2, 0))
         side_in, side_out = (-b - h) / a, (-b + h) / a
     inside = lo[:, 0] ** 2 + lo[:, 1] ** 2 < cylinder.radius**2

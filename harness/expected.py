@@ -49,7 +49,7 @@ def prism_deviation(theta_i: Float, apex: float, ior: float) -> Float:
     s = np.sin(theta_i)
     with np.errstate(invalid="ignore"):
         exit_angle = np.arcsin(np.sin(apex) * np.sqrt(ior**2 - s**2) - np.cos(apex) * s)
-    return theta_i + exit_angle - apex
+    return np.asarray(theta_i + exit_angle - apex)
 
 
 def prism_minimum_deviation(apex: float, ior: float) -> float:

@@ -97,25 +97,24 @@ class CaseJudge:
 
     def _compare(self, spec: model.CheckSpec, contender: Contender) -> Comparison:
         observable, preflight = Observable(spec.observable), contender.ready()
+        precision = contender.precision(self._case.scene)
         if observable in IMAGE_OBSERVABLES:
             picture = self._results.picture(contender, plan.IMAGE)
             level = FALSE_ALARM if preflight.noisy else None
             return radiance.against_truth(
-                self._case.scene, picture, preflight.quantum, preflight.epsilon, level
+                self._case.scene, picture, preflight.quantum, precision, level
             )
         probe = self._case.probe(spec.probe)
         truth = self._truth(probe)
         if observable in RAYS:
-            return RAYS[observable](truth, self._measured(contender, probe), preflight.epsilon)
+            return RAYS[observable](truth, self._measured(contender, probe), precision)
         pixels = self._results.picture(contender, plan.light_role(probe))
         if observable in BOUNDARIES:
             return BOUNDARIES[observable](truth, pixels, preflight.quantum)
         n2 = Capability.RADIANCE_N2 in contender.capabilities
         if preflight.noisy:
             return light_observables.sampled_path_weight(truth, pixels, FALSE_ALARM, n2)
-        return light_observables.path_weight(
-            truth, pixels, preflight.epsilon, preflight.quantum, n2
-        )
+        return light_observables.path_weight(truth, pixels, precision, preflight.quantum, n2)
 
     def _truth(self, probe: model.Probe) -> ProbeTruth:
         if probe.name not in self._truths:

@@ -29,7 +29,8 @@ from harness.scene.resolved import (
     Transport,
 )
 
-LOW, HIGH, MIDDLE = 0.05, 0.95, 0.5
+# The chart's brightest radiance is 1, so that its quantum is that of a scene of radiance 1.
+LOW, HIGH, MIDDLE = 0.1, 1.0, 0.5
 # The weakest light a probe path is expected to leave; codes are made as fine as it allows.
 WEAKEST = 0.3
 FINEST = 4096

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 from harness.errors import RendererError, RendererFailed
 from harness.measure.images import Pixels
-from harness.preflight import Preflight
+from harness.measure.precision import Precision
+from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Verdict
 from harness.renderers.base import Capability, Image, RayPaths
+from harness.scene.resolved import Mesh, ResolvedScene
 
 Result = Image | RayPaths | RendererError
 
@@ -38,6 +40,13 @@ class Contender:
         if self.absent is not None or self.preflight is None:
             raise NotAvailable(self.absent or Verdict.ERROR, self.reason or "no preflight")
         return self.preflight
+
+    def precision(self, scene: ResolvedScene) -> Precision:
+        """Of its numbers in this scene: stored in float32, vertices make a mesh no better."""
+        double = Capability.DOUBLE_DATA in self.capabilities
+        data = FLOAT64 if double else FLOAT32
+        meshes = any(isinstance(solid.shape, Mesh) for solid in scene.solids)
+        return Precision(max(self.ready().epsilon, data) if meshes else self.ready().epsilon, data)
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ class TruePaths:
     `status` is HIT (not ended early), MISS (no such interface) or TIR. `origin` and `direction`
     (m, 3) are the ray that leaves the last interface, in `medium` (m,). `weight` is the product of
     the Fresnel factors and `absorbed` (m, 3) the optical depth so far. Per interface k:
-    `cos_theta_i` (m, letters), `interface` (m, letters, 3) and `n` (m, letters, 3) facing the ray.
+    `cos_theta_i` (m, letters), `eta_i_over_t` (m, letters; 1 where it is reflected), `interface`
+    (m, letters, 3) and `n` (m, letters, 3) facing the ray.
     `inside` (solids, m) says which solids the ray is in, and `ahead` (m,) how far away the next
     interface is; infinite where there is none.
     """
@@ -37,6 +38,7 @@ class TruePaths:
     weight: Float
     absorbed: Float
     cos_theta_i: Float
+    eta_i_over_t: Float
     interface: Float
     n: Float
     inside: NDArray[np.bool_]
@@ -70,7 +72,7 @@ class ClosedForm:
         o, d = rays.origins.copy(), rays.directions.copy()
         status = np.full(m, Status.HIT, np.int8)
         weight, absorbed = np.ones(m), np.zeros((m, 3))
-        cos_i = np.full((m, count), np.nan)
+        cos_i, eta = np.full((m, count), np.nan), np.ones((m, count))
         interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
         ior = np.array([medium.ior for medium in scene.media])
         sigma = np.array([medium.absorption for medium in scene.media])
@@ -98,6 +100,7 @@ class ClosedForm:
                 weight *= np.where(live, reflectance, 1.0)
                 d = np.where(live[:, None], reflect(d, facing), d)
                 continue
+            eta[:, k] = ior[medium] / ior[beyond]
             bent, total = refract(d, facing, ior[medium], ior[beyond])
             status[live & total] = Status.TIR
             live &= ~total
@@ -107,7 +110,7 @@ class ClosedForm:
             medium = np.where(live, beyond, medium)
         ahead, _, _ = _next_interface([body.chord(o, d) for body in bodies], inside)
         return TruePaths(
-            status, o, d, medium, weight, absorbed, cos_i, interface, normals, inside, ahead
+            status, o, d, medium, weight, absorbed, cos_i, eta, interface, normals, inside, ahead
         )
 
     def land(self, paths: TruePaths, plane: Rectangle) -> Landing:

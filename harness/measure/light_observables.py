@@ -13,6 +13,7 @@ from harness import expected
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
+from harness.measure.precision import Precision
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.statistics import binned
 from harness.probe.decode import lit_threshold
@@ -20,7 +21,7 @@ from harness.renderers.base import Status
 
 
 def path_weight(
-    truth: ProbeTruth, pixels: NDArray[np.float32], epsilon: float, quantum: float, n2: bool
+    truth: ProbeTruth, pixels: NDArray[np.float32], precision: Precision, quantum: float, n2: bool
 ) -> Comparison:
     """Reflectance or transmittance of the path, per pixel, of a renderer without noise.
 
@@ -30,7 +31,7 @@ def path_weight(
     measured = pixels.reshape(-1, 3).astype(np.float64)
     true, used = _expected_level(truth, n2)
     error = np.abs(measured - true)
-    tolerance = (quantum + truth.level_tolerance(epsilon) * true.max(axis=1, initial=1))[:, None]
+    tolerance = (quantum + truth.level_tolerance(precision) * true.max(axis=1, initial=1))[:, None]
     tolerance = np.broadcast_to(tolerance, error.shape)
     if not np.isfinite(error[used]).all():
         raise Unmeasurable("a measured pixel is not finite")

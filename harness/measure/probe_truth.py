@@ -14,16 +14,42 @@ from numpy.typing import NDArray
 
 from harness.camera import primary_rays
 from harness.expected import Float
+from harness.measure.precision import Precision
 from harness.renderers.base import Rays, Status
+from harness.scene.containment import bounds
 from harness.scene.resolved import Rectangle, ResolvedScene
 from harness.truth import ClosedForm, Landing, TruePaths
 
 # Step of the differences, relative to the scene's extent. Larger than any float32 renderer's own
 # error, so that a ray within that error of an edge is recognised as grazing it.
 STEP = 1e-5
-# Roundings in sequence in one intersection and one refraction: root, point, normal, cosine,
-# square root, two products and a sum. The same 8 as in the bound 8 eps on a refracted direction.
+# Roundings in sequence, each of half an epsilon: of a point in one intersection (distance, product,
+# sum), relative to the coordinates involved, and of a direction in one refraction (normal, cosine,
+# its square, difference, root, two products, sum), relative to 1.
+POINT_ROUNDINGS = 3
 ROUNDINGS = 8
+
+
+@dataclass(frozen=True)
+class Condition:
+    """How much a result changes with what it is made from, per ray (m,).
+
+    Per unit by which the ray's origin moves, per radian by which it tilts, and per relative change
+    of all indices of refraction.
+    """
+
+    by_origin: Float
+    by_direction: Float
+    by_index: Float
+
+    def bound(self, own: float, steps: Float, extent: float, precision: Precision) -> Float:
+        """Bound on the error of a result that itself is rounded by `own` roundings.
+
+        `steps` (m,) is how many times the start's rounding all roundings along the way amount to.
+        """
+        unit = precision.arithmetic / 2
+        start = POINT_ROUNDINGS * extent * self.by_origin + ROUNDINGS * self.by_direction
+        return np.asarray(unit * (own + steps * start) + precision.data / 2 * self.by_index)
 
 
 @dataclass(frozen=True)
@@ -31,8 +57,7 @@ class ProbeTruth:
     """Truth of all m rays of one probe.
 
     `grazing` (m,) marks rays that change their fate when shifted by `STEP`: they say nothing.
-    Condition numbers: `point_by_origin` is the largest shift of the landing point per unit shift
-    of the origin, `point_by_direction` (units per rad), and so on.
+    `extent` is the largest coordinate that arithmetic along the rays has to carry.
     """
 
     scene: ResolvedScene
@@ -42,13 +67,10 @@ class ProbeTruth:
     paths: TruePaths
     landings: tuple[Landing, ...]
     grazing: NDArray[np.bool_]
-    point_by_origin: Float
-    point_by_direction: Float
-    direction_by_origin: Float
-    direction_by_direction: Float
-    level_by_origin: Float
-    level_by_direction: Float
     extent: float
+    point: Condition
+    direction: Condition
+    weight: Condition
 
     @property
     def theta_i(self) -> Float:
@@ -67,20 +89,33 @@ class ProbeTruth:
         """(m, 3) what the path leaves of radiance 1: Fresnel factors times absorption."""
         return np.asarray(self.paths.weight[:, None] * self.landings[0].transmission)
 
-    def level_tolerance(self, epsilon: float) -> Float:
-        """Bound on the level's error for arithmetic of relative precision epsilon."""
-        steps = ROUNDINGS * (len(self.path) + 1) * epsilon
-        return steps * (self.extent * self.level_by_origin + self.level_by_direction + 1)
+    @property
+    def _steps(self) -> Float:
+        """(m,) the roundings at the start and after each interface, all as if made at the start.
 
-    def point_tolerance(self, epsilon: float) -> Float:
-        """Bound on the landing point's error, units; `epsilon` is the relative precision."""
-        steps = ROUNDINGS * (len(self.path) + 1) * epsilon
-        return steps * (self.extent * self.point_by_origin + self.point_by_direction + self.extent)
+        An angle grows by A = (n_i cos_i) / (n_t cos_t) in the plane of incidence and by n_i / n_t
+        across it (Snell's law, differentiated). One made after an interface has missed that
+        growth, so seen from the start it counts 1 / A times.
+        """
+        eta, cos_i = self.paths.eta_i_over_t, self.paths.cos_theta_i
+        with np.errstate(invalid="ignore"):
+            cos_t = np.sqrt(1 - eta**2 * (1 - cos_i**2))
+            shrinkage = np.fmax(cos_t / cos_i, 1.0) / eta
+        shrinkage = np.where(np.isfinite(shrinkage), shrinkage, 1.0)
+        return np.asarray(1 + np.cumprod(shrinkage, axis=1).sum(axis=1))
 
-    def direction_tolerance(self, epsilon: float) -> Float:
+    def point_tolerance(self, precision: Precision) -> Float:
+        """Bound on the landing point's error, units."""
+        own = POINT_ROUNDINGS * self.extent
+        return self.point.bound(own, self._steps, self.extent, precision)
+
+    def direction_tolerance(self, precision: Precision) -> Float:
         """Bound on the direction's error, rad."""
-        steps = ROUNDINGS * (len(self.path) + 1) * epsilon
-        return steps * (self.extent * self.direction_by_origin + self.direction_by_direction + 1)
+        return self.direction.bound(ROUNDINGS, self._steps, self.extent, precision)
+
+    def level_tolerance(self, precision: Precision) -> Float:
+        """Bound on the level's error."""
+        return self.weight.bound(ROUNDINGS, self._steps, self.extent, precision)
 
 
 def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) -> ProbeTruth:
@@ -89,39 +124,56 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
     exact = ClosedForm(scene)
     paths = exact.follow(rays, path)
     landings = tuple(exact.land(paths, plane) for plane in planes)
-    extent = _extent(rays, landings)
+    extent = _extent(scene, rays, landings)
+    level = paths.weight[:, None] * landings[0].transmission
     grazing = np.zeros(len(rays.origins), bool)
-    squares = {key: np.zeros(len(grazing)) for key in ("po", "pd", "do", "dd", "lo", "ld")}
-    for kind, shifted in _shifted(rays, STEP * extent):
-        other = exact.follow(shifted, path)
-        other_landings = [exact.land(other, plane) for plane in planes]
+    none = np.zeros(len(grazing))
+    # Squared rates of change by cause, for the point, the direction and the level.
+    rates = {cause: [none.copy() for _ in range(3)] for cause in ("origin", "direction", "index")}
+    denser = ClosedForm(_denser(scene))
+    trials = [*_shifted(rays, STEP * extent), ("index", rays, STEP)]
+    for cause, shifted, step in trials:
+        form = denser if cause == "index" else exact
+        other = form.follow(shifted, path)
         grazing |= _fate_differs(paths, other)
-        step = STEP * extent if kind == "o" else STEP
-        squares["d" + kind] += _rate(paths.direction, other.direction, step)
-        level = paths.weight[:, None] * landings[0].transmission
-        other_level = other.weight[:, None] * other_landings[0].transmission
-        squares["l" + kind] += _rate(level, other_level, step)
-        worst = np.zeros(len(grazing))
-        for mine, theirs in zip(landings, other_landings, strict=True):
+        worst = none
+        for mine, plane in zip(landings, planes, strict=True):
+            theirs = form.land(other, plane)
             grazing |= mine.status != theirs.status
             worst = np.fmax(worst, _rate(mine.point, theirs.point, step))
-        squares["p" + kind] += worst
-    roots = {key: np.sqrt(value) for key, value in squares.items()}
+        other_level = other.weight[:, None] * form.land(other, planes[0]).transmission
+        squares = rates[cause]
+        squares[0] += worst
+        squares[1] += _rate(paths.direction, other.direction, step)
+        squares[2] += _rate(level, other_level, step)
+    point, direction, weight = (
+        Condition(*(np.sqrt(rates[cause][k]) for cause in ("origin", "direction", "index")))
+        for k in range(3)
+    )
     return ProbeTruth(
-        scene, rays, path, planes, paths, landings, grazing,
-        roots["po"], roots["pd"], roots["do"], roots["dd"], roots["lo"], roots["ld"], extent,
-    )  # fmt: skip
+        scene, rays, path, planes, paths, landings, grazing, extent, point, direction, weight
+    )
 
 
-def _extent(rays: Rays, landings: tuple[Landing, ...]) -> float:
-    """The largest coordinate that arithmetic along the rays has to carry."""
+def _denser(scene: ResolvedScene) -> ResolvedScene:
+    """All indices but that of the surroundings larger by `STEP`, relatively."""
+    media = [m.model_copy(update={"ior": m.ior * (1 + STEP)}) for m in scene.media[1:]]
+    return scene.model_copy(update={"media": (scene.media[0], *media)})
+
+
+def _extent(scene: ResolvedScene, rays: Rays, landings: tuple[Landing, ...]) -> float:
+    """The largest coordinate that arithmetic along the rays has to carry.
+
+    The solids' own count too: a triangle's point of intersection is as exact as its corners allow.
+    """
     points = [landing.point[landing.status == Status.HIT] for landing in landings]
     values = [np.abs(rays.origins).max(), *(np.abs(p).max() for p in points if p.size)]
-    return float(max(1.0, *values))
+    values += [np.abs(bounds(solid.shape)).max() for solid in scene.solids]
+    return float(max(values))
 
 
-def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays]]:
-    """The rays shifted sideways ("o") and tilted ("d"), each along two perpendicular axes."""
+def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays, float]]:
+    """The rays moved sideways by `step` and tilted by `STEP`, along two perpendicular axes."""
     d = rays.directions
     helper = np.where((np.abs(d[:, :1]) < 0.6), [[1.0, 0, 0]], [[0, 1.0, 0]])
     e1 = np.cross(d, helper)
@@ -129,10 +181,10 @@ def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays]]:
     e2 = np.cross(d, e1)
     out = []
     for e in (e1, e2):
-        out.append(("o", Rays(rays.origins + step * e, d)))
+        out.append(("origin", Rays(rays.origins + step * e, d), step))
         tilted = d + STEP * e
         tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
-        out.append(("d", Rays(rays.origins, tilted)))
+        out.append(("direction", Rays(rays.origins, tilted), STEP))
     return out
 
 

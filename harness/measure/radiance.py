@@ -13,6 +13,7 @@ from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.images import Pixels
 from harness.measure.pictures import geometric_error
+from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS
 from harness.measure.statistics import binned
 from harness.renderers.base import Rays
@@ -137,7 +138,11 @@ def _emission(pattern: Pattern, u: Float, v: Float, face: Rectangle) -> tuple[Fl
 
 
 def against_truth(
-    scene: ResolvedScene, picture: Pixels, quantum: float, epsilon: float, noise_level: float | None
+    scene: ResolvedScene,
+    picture: Pixels,
+    quantum: float,
+    precision: Precision,
+    noise_level: float | None,
 ) -> Comparison:
     """A picture against its closed form, pixel by pixel; edges within a renderer's error excluded.
 
@@ -150,13 +155,15 @@ def against_truth(
     if not np.isfinite(picture).all():
         raise Unmeasurable("the picture holds values that are not finite")
     extent = float(np.abs(np.array(scene.camera.origin)).max()) + 1
-    stray = geometric_error(extent, len(scene.surfaces), epsilon)
+    stray = geometric_error(extent, len(scene.surfaces), precision.arithmetic)
     if noise_level is not None:
         rows = np.flatnonzero(edge.ravel() > footprint(scene))
         return binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise_level)
     keep = edge > stray
     error = np.abs(picture.astype(np.float64) - true).max(axis=-1)
-    tolerance = quantum + ROUNDINGS * (len(scene.surfaces) + 1) * epsilon * float(true.max())
+    tolerance = quantum + ROUNDINGS * (len(scene.surfaces) + 1) * precision.arithmetic / 2 * float(
+        true.max()
+    )
     y, x = np.unravel_index(int(np.where(keep, error, -1).argmax()), error.shape)
     channel = int(np.abs(picture[y, x].astype(np.float64) - true[y, x]).argmax())
     return Comparison(

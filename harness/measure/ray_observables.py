@@ -1,7 +1,7 @@
 """Observables of single rays: each compares one renderer's rays with their truth.
 
-Every function takes the truth and the measurement of the same rays, the relative precision
-`epsilon` of the renderer's arithmetic, and returns a `Comparison`. Rays that graze an edge are left
+Every function takes the truth and the measurement of the same rays, the `precision`
+of the renderer's numbers, and returns a `Comparison`. Rays that graze an edge are left
 out and counted; a ray that should arrive and does not, or the other way round, is a fault.
 """
 
@@ -14,6 +14,7 @@ from harness import expected
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
+from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.rays import RayMeasurement
 from harness.record import Curve
@@ -22,11 +23,11 @@ from harness.scene.resolved import Mesh, Solid, Sphere
 from harness.truth import ClosedForm
 
 
-def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def exit_point(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Distance between measured and true landing point on the first plane, scene units."""
     used, fault, counts = _used(truth, rays)
     error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1)
-    tolerance = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
     vector = (rays.point - truth.landings[0].point)[_worst(error, tolerance, used)]
     detail = counts | {f"worst_d{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
     return _comparison(
@@ -38,12 +39,12 @@ def exit_point(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Compa
     )  # fmt: skip
 
 
-def exit_direction(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def exit_direction(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Angle between measured and true direction after the last interface, microradians."""
     direction = _direction(rays)
     used, fault, counts = _used(truth, rays)
     error = _angle(direction, truth.paths.direction) * 1e6
-    tolerance = (rays.direction_uncertainty + truth.direction_tolerance(epsilon)) * 1e6
+    tolerance = (rays.direction_uncertainty + truth.direction_tolerance(precision)) * 1e6
     return _comparison(
         truth, error, 0.0, tolerance, used, fault, counts,
         _derivation(rays, "8 eps per rounding chain x condition of the direction"),
@@ -53,7 +54,7 @@ def exit_direction(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> C
     )  # fmt: skip
 
 
-def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def internal_angle(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Angle of refraction inside the medium, degrees, against asin(ior_i sin(theta_i) / ior_t).
 
     The plane must be immersed: the ray's way from the true point of entry to its landing point is
@@ -66,7 +67,7 @@ def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> C
     measured = _angle(way / length[:, None], -n)
     ior_i, ior_t = _indices(truth)
     true = expected.snell_angle(truth.theta_i, ior_i, ior_t)
-    shift = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    shift = rays.point_uncertainty + truth.point_tolerance(precision)
     tolerance = np.degrees(shift / length)
     return _comparison(
         truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
@@ -78,7 +79,7 @@ def internal_angle(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> C
     )  # fmt: skip
 
 
-def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def slab_offset(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Sideways shift of the ray by a parallel slab, scene units, positive as glass shifts it.
 
     Measured against the line of the incident ray; the truth is the closed form for the slab's
@@ -98,7 +99,7 @@ def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comp
     thickness = float(np.median(np.abs(np.einsum("ij,ij->i", inside, n))[used]))
     ior_i, ior_t = _indices(truth)
     true = expected.slab_offset(truth.theta_i, thickness, ior_t / ior_i)
-    tolerance = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
     worst = np.abs(offset - true)[used].max()
     counts |= {"thickness": thickness, "max_relative_to_thickness": float(worst / thickness)}
     return _comparison(
@@ -108,7 +109,7 @@ def slab_offset(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comp
     )  # fmt: skip
 
 
-def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def deviation(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Deviation by a prism in its principal plane, degrees; the image's middle row lies in it."""
     direction = _direction(rays)
     used, fault, counts = _used(truth, rays)
@@ -119,7 +120,7 @@ def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Compar
     ior_i, ior_t = _indices(truth)
     measured = _angle(direction, truth.rays.directions)
     true = np.abs(expected.prism_deviation(signed_incidence(truth), apex, ior_t / ior_i))
-    tolerance = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(epsilon))
+    tolerance = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(precision))
     counts |= {"apex_deg": float(np.degrees(apex))}
     return _comparison(
         truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
@@ -131,7 +132,7 @@ def deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Compar
     )  # fmt: skip
 
 
-def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Smallest deviation of the curve, degrees, by a parabola through its lowest samples.
 
     The same estimate on the true curve at the same angles tells the estimate's own error, which is
@@ -149,7 +150,7 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -
     closed = np.degrees(expected.prism_minimum_deviation(apex, ior_t / ior_i))
     bias = _vertex(theta, np.degrees(true_curve)) - closed
     value = _vertex(theta, np.degrees(_angle(direction, truth.rays.directions)[used])) - bias
-    bound = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(epsilon))[used]
+    bound = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(precision))[used]
     tolerance = 3 * float(bound[np.argsort(np.abs(true_curve - true_curve.min()))[:7]].max())
     return Comparison(
         value, float(closed), tolerance, bool(abs(value - closed) <= tolerance) and not fault,
@@ -159,7 +160,7 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -
     )  # fmt: skip
 
 
-def tir(truth: ProbeTruth, rays: RayMeasurement, _epsilon: float) -> Comparison:
+def tir(truth: ProbeTruth, rays: RayMeasurement, _precision: Precision) -> Comparison:
     """Rays lit where there is total internal reflection, or dark where light must pass."""
     fate = truth.paths.status
     clear = ~truth.grazing & ~rays.faint & np.isin(fate, (Status.HIT, Status.TIR))
@@ -182,7 +183,7 @@ def tir(truth: ProbeTruth, rays: RayMeasurement, _epsilon: float) -> Comparison:
     )  # fmt: skip
 
 
-def inversion(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def inversion(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Magnification of the view through a lens; negative is upside down.
 
     How fast the landing point climbs with the pixel in the middle of the image, relative to the
@@ -204,7 +205,7 @@ def inversion(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Compar
         return float(np.polyfit(straight, (points @ up)[near], 1)[0])
 
     value, true = slope(rays.point), slope(truth.landings[0].point)
-    bound = rays.point_uncertainty + truth.point_tolerance(epsilon)
+    bound = rays.point_uncertainty + truth.point_tolerance(precision)
     tolerance = 2 * float(bound[near].max()) / float(np.ptp(straight))
     upright = "upright" if true > 0 else "inverted"
     return Comparison(
@@ -214,7 +215,7 @@ def inversion(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Compar
     )  # fmt: skip
 
 
-def tessellation_error(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) -> Comparison:
+def tessellation_error(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """RMS angle between rays through a polygon ball and through its sphere, microradians.
 
     The truth of the polygons themselves is in closed form too, so the value to expect is known.
@@ -230,7 +231,7 @@ def tessellation_error(truth: ProbeTruth, rays: RayMeasurement, epsilon: float) 
         return float(np.sqrt(np.mean(_angle(d[used], smooth.direction[used]) ** 2)) * 1e6)
 
     value, true = rms(direction), rms(truth.paths.direction)
-    bound = (rays.direction_uncertainty + truth.direction_tolerance(epsilon))[used]
+    bound = (rays.direction_uncertainty + truth.direction_tolerance(precision))[used]
     tolerance = float(np.sqrt(np.mean(bound**2)) * 1e6)
     solid = truth.scene.solids[0].shape
     counts |= {"triangles": len(solid.triangles) if isinstance(solid, Mesh) else 0}

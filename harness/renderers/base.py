@@ -27,6 +27,7 @@ class Capability(enum.StrEnum):
     RAYS = "rays"  # offers trace()
     PIXEL_CENTRES = "pixel-centres"  # samples exactly the pixel centre; no noise
     DOUBLE = "double"  # float64 arithmetic; others are taken to be float32
+    DOUBLE_DATA = "double-data"  # keeps indices and vertices in float64, too
     LOBE_SWITCH = "lobe-switch"  # honours transport.reflection / .transmission
     SPHERE = "sphere"  # analytic, not tessellated
     CONVEX = "convex"

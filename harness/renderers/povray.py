@@ -59,6 +59,7 @@ class PovRayRenderer:
     name = "povray"
     capabilities = frozenset(
         {
+            Capability.DOUBLE,
             Capability.IMAGE,
             Capability.PIXEL_CENTRES,
             Capability.LOBE_SWITCH,
