@@ -285,6 +285,7 @@ def test_beyond_the_critical_angle_everything_is_reflected(share: float, ior: fl
 def test_slabs_add_up(theta: float, ior: float, parts: list[float]) -> None:
     whole = expected.slab_offset(one(theta), sum(parts), ior)[0]
     pieces = sum(expected.slab_offset(one(theta), part, ior)[0] for part in parts)
+    # Each part is the same factor times its thickness, so only products and sums are rounded.
     assert abs(whole - pieces) <= (len(parts) + 8) * EPS * sum(parts)
 
 
@@ -293,7 +294,9 @@ def test_a_slab_shifts_by_less_than_its_thickness_and_glass_towards_the_normal(
     theta: float, ior: float
 ) -> None:
     offset = float(expected.slab_offset(one(theta), 1.0, ior)[0])
-    assert -8 * EPS <= offset <= math.sin(theta) + 8 * EPS
+    # n^2 - sin^2 cancels where n is near 1 and the ray grazes: to cos^2, with an error of eps.
+    bound = 8 * EPS / math.cos(theta) ** 2
+    assert -bound <= offset <= math.sin(theta) + bound
 
 
 @given(st.floats(0.1, 1.3), st.floats(1.05, 1.5))
