@@ -16,8 +16,8 @@ HELLO = {
     "name": "student",
     "version": "1.0",
     "capabilities": [
-        *("image", "pixel-centres", "double", "lobe-switch", "sphere", "convex"),
-        *("picture", "absorption", "fresnel", "nested", "camera-inside"),
+        *("image", "pixel-centres", "double", "double-data", "lobe-switch"),
+        *("sphere", "convex", "picture", "absorption", "fresnel", "nested", "camera-inside"),
     ],
     "operations": ["render"],
 }

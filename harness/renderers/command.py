@@ -30,6 +30,7 @@ ImageFormat = Literal["exr", "pfm", "npy", "png", "ppm"]
 USUAL_CLAIMS = frozenset(Capability) - {
     Capability.RAYS,
     Capability.DOUBLE,
+    Capability.DOUBLE_DATA,
     Capability.LOBE_SWITCH,
     Capability.THIN_SLAB,
     Capability.RADIANCE_N2,

@@ -209,7 +209,7 @@ def test_the_documents_name_everything() -> None:
     claims = re.search(r"## What a renderer can claim\n(.*?)\n## ", text, re.DOTALL)
     assert claims is not None
     assert re.findall(r"^\| `([\w-]+)` \|", claims[1], re.MULTILINE) == [str(c) for c in Capability]
-    unclaimed = re.search(r"claim all but (.*?)\.\n", claims[1])
+    unclaimed = re.search(r"claim all but (.*?)\.\n", claims[1], re.DOTALL)
     assert unclaimed is not None
     assert set(re.findall(r"`([\w-]+)`", unclaimed[1])) == set(Capability) - USUAL_CLAIMS
     keys = re.search(r"\n\| key \|.*?\n\n", text, re.DOTALL)
