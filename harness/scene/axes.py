@@ -38,6 +38,12 @@ class Axes:
     broken: set[str] = field(default_factory=set)
     findings: list[Finding] = field(default_factory=list)
 
+    def refuse(self, finding: Finding) -> None:
+        """Gives up on all axes."""
+        self.findings.append(finding)
+        self.broken |= self.values.keys()
+        self.values = {}
+
 
 def read_axes(document: dict[str, object], calculator: Calculator) -> Axes:
     """The ``[axes]`` of a document. More than MOST_COMBINATIONS combinations are refused."""
@@ -54,9 +60,7 @@ def read_axes(document: dict[str, object], calculator: Calculator) -> Axes:
     if total > MOST_COMBINATIONS:
         sizes = " × ".join(f"{name} ({len(values)})" for name, values in axes.values.items())
         message = f"{sizes} are {total} combinations"
-        axes.findings.append(Finding(("axes",), message, None, f"≤ {MOST_COMBINATIONS}"))
-        axes.broken |= axes.values.keys()
-        axes.values = {}
+        axes.refuse(Finding(("axes",), message, None, f"≤ {MOST_COMBINATIONS}"))
     return axes
 
 

@@ -18,6 +18,8 @@ AIR = "air"  # what surrounds everything; a scene may define it otherwise
 AGAINST = ("truth", "renderers")
 BUILT_IN = frozenset({"tracer", "povray", "mitsuba", "mitsuba-exact"})
 
+MOST_NAMES = 30  # that a message lists
+
 Table = Mapping[str, object]
 
 
@@ -62,7 +64,8 @@ def _reference(path: KeyPath, name: str | None, known: Collection[str] | None) -
     key = next(part for part in reversed(path) if isinstance(part, str))
     what = "renderer" if key == "against" else key.removesuffix("s")
     names = sorted(known)
-    expected = ", ".join(names) or f"a {what} that the scene defines"
+    listed = ", ".join(names[:MOST_NAMES]) + (", …" if len(names) > MOST_NAMES else "")
+    expected = listed or f"a {what} that the scene defines"
     yield Finding(path, f"unknown {what}", quoted(name), expected, nearest(name, names))
 
 

@@ -9,7 +9,13 @@ from pathlib import Path
 from harness.errors import InputError
 from harness.scene.findings import KeyPath
 
-LARGEST_FILE = 8 * 2**20  # bytes; a mesh written out has some 100 per triangle
+LARGEST_FILE = 4 * 2**20  # bytes; a mesh written out has some 100 per triangle
+MOST_VALUES = 200_000  # numbers, texts, arrays and tables together
+DEEPEST = 32  # tables and arrays in each other
+TOO_DEEP = "nested too deeply"
+
+QUOTED = re.compile(rb'"(?:[^"\\\n]|\\.){0,200}"|' rb"'[^'\n]{0,200}'")
+BARE_KEY = re.compile(rb"[ \t]*[A-Za-z0-9_-]+[ \t]*")
 
 
 def read_source(path: Path) -> bytes:
@@ -28,12 +34,14 @@ def read_source(path: Path) -> bytes:
 def parse_document(source: bytes, path: Path) -> dict[str, object]:
     """The TOML data of `source`; raises InputError with the line of what is not valid TOML."""
     try:
-        return tomllib.loads(source.decode("utf-8"))
+        text = source.decode("utf-8")
+        _limit_keys(source)
+        document = tomllib.loads(text)
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise InputError.of("not UTF-8 text", file=path, line=line) from error
     except RecursionError as error:
-        raise InputError.of("nested too deeply", file=path) from error
+        raise InputError.of(TOO_DEEP, file=path) from error
     except ValueError as error:  # TOMLDecodeError, or an integer of thousands of digits
         message, line = str(error), None
         if position := re.search(r" \(at line (\d+), column (\d+)\)$", message):
@@ -42,6 +50,45 @@ def parse_document(source: bytes, path: Path) -> dict[str, object]:
         elif message.endswith(" (at end of document)"):
             line = source.count(b"\n") + 1
         raise InputError.of(f"not valid TOML: {message}", file=path, line=line) from error
+    try:
+        count = count_values(document)
+    except RecursionError as error:
+        raise InputError.of(TOO_DEEP, file=path) from error
+    if count > MOST_VALUES:
+        raise InputError.of(f"more than {MOST_VALUES} values", file=path)
+    return document
+
+
+def _limit_keys(source: bytes) -> None:
+    """Raises RecursionError for keys of very many parts, on which tomllib takes minutes."""
+    for line in source.splitlines():
+        if line.count(b".") > DEEPEST:
+            run = 0
+            for part in QUOTED.sub(b"q", line).split(b"."):
+                run = run + 1 if BARE_KEY.fullmatch(part) else 0
+                if run > DEEPEST:
+                    raise RecursionError
+
+
+def count_values(document: object) -> int:
+    """Values in a document, arrays and tables counted too.
+
+    Raises RecursionError where it is nested deeper than DEEPEST, long before Python's limit.
+    """
+    level: list[object] = [document]
+    count = 0
+    for _ in range(DEEPEST):
+        if not level:
+            return count
+        count += len(level)
+        below: list[object] = []
+        for node in level:
+            if isinstance(node, dict):
+                below += node.values()
+            elif isinstance(node, list):
+                below += node
+        level = below
+    raise RecursionError
 
 
 def value_at(document: object, path: KeyPath) -> object:

@@ -8,9 +8,11 @@ both, and is replaced by its value wherever it stands, but not in prose such as 
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, field
 
-from harness.scene.axes import check_name, check_number, read_axes, table
+from harness.scene.axes import Axes, check_name, check_number, read_axes, table
+from harness.scene.document import count_values
 from harness.scene.expressions import (
     CONSTANTS,
     Calculator,
@@ -20,6 +22,8 @@ from harness.scene.expressions import (
     is_expression,
 )
 from harness.scene.findings import Finding, KeyPath, SceneInvalid, quoted
+
+MOST_WORK = 5_000_000  # permutations x values of a document
 
 # Keys whose text is meant for people; a "=" at their start is only a character.
 PROSE = frozenset(
@@ -77,8 +81,11 @@ def expand(document: dict[str, object]) -> Expansion:
     """
     calculator = Calculator()
     axes = read_axes(document, calculator)
+    _limit_work(document, axes)
     findings = dict.fromkeys(axes.findings)
-    body = {key: value for key, value in document.items() if key not in ("axes", "parameters")}
+    body = {
+        key: _frozen(value) for key, value in document.items() if key not in ("axes", "parameters")
+    }
     expansion = Expansion()
     for combination in itertools.product(*axes.values.values()):
         chosen = dict(zip(axes.values, combination, strict=True))
@@ -93,6 +100,15 @@ def expand(document: dict[str, object]) -> Expansion:
                 findings[_appended(finding, where)] = None
     expansion.findings = list(findings)
     return expansion
+
+
+def _limit_work(document: dict[str, object], axes: Axes) -> None:
+    """Gives up on axes whose permutations of a large document would take minutes."""
+    permutations = math.prod(len(values) for values in axes.values.values())
+    values = count_values(document)
+    if permutations * values > MOST_WORK:
+        message = f"{permutations} permutations of a scene of {values} values"
+        axes.refuse(Finding(("axes",), message, None, f"a product ≤ {MOST_WORK:.0e}"))
 
 
 def _appended(finding: Finding, where: str) -> Finding:
@@ -148,14 +164,14 @@ class _Evaluation:
 
     def table(self, node: dict[str, object], path: KeyPath) -> dict[str, object]:
         return {
-            key: _frozen(value) if key in PROSE else self._tree(value, (*path, key))
+            key: value if key in PROSE else self._tree(value, (*path, key))
             for key, value in node.items()
         }
 
     def _tree(self, node: object, path: KeyPath) -> object:
         if isinstance(node, dict):
             return self.table(node, path)
-        if isinstance(node, list):
+        if isinstance(node, tuple):
             return tuple(self._tree(item, (*path, index)) for index, item in enumerate(node))
         if is_expression(node):
             value = self.value(node, path)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Schema = Mapping[str, Any]
 
+MOST_DETAILS = 1000
 UNKNOWN_KEY = "unknown key"
 MISSING = "missing"
 WRONG_TYPE = {
@@ -46,6 +47,7 @@ BOUNDS = {
 def findings_of(error: ValidationError, document: dict[str, object]) -> list[Finding]:
     """One finding per error of `Case`, without repetitions and without what follows from others."""
     details = [d for d in error.errors(include_url=False) if not _is_consequence(d)]
+    details = details[:MOST_DETAILS]
     findings = list(dict.fromkeys(_finding(detail, document) for detail in details))
     # A key that is misspelt is not missing on top.
     misspelt = {(*f.path[:-1], f.suggestion) for f in findings if f.message == UNKNOWN_KEY}

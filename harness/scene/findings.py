@@ -23,6 +23,7 @@ KeyPath = tuple[str | int, ...]
 Result = TypeVar("Result")
 
 LONGEST_VALUE = 80  # characters of a value that a message quotes
+LONGEST_KEY = 200
 
 
 @dataclass(frozen=True)
@@ -87,8 +88,15 @@ def quoted(value: object) -> str:
         text = json.dumps(value, ensure_ascii=False, default=str)
     except (ValueError, RecursionError):  # integers of thousands of digits; deep nesting
         text = f"a {type(value).__name__}"
-    text = "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
+    text = printable(text)
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 1] + "…"
+
+
+def printable(text: str) -> str:
+    """The text with whatever could act on a terminal or break a line escaped."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
 
 
 def lines_of_keys(source: bytes) -> dict[KeyPath, int]:
@@ -169,13 +177,13 @@ def problems(findings: Iterable[Finding], file: Path, source: bytes | None) -> l
     lines = lines_of_keys(source) if source is not None else {}
     located = [
         Problem(
-            finding.message,
+            printable(finding.message),
             file=file,
             line=_nearest_line(finding.path, lines),
-            key=dotted(finding.path),
+            key=dotted(finding.path)[:LONGEST_KEY],
             value=finding.value,
-            expected=finding.expected,
-            suggestion=finding.suggestion,
+            expected=finding.expected and printable(finding.expected),
+            suggestion=finding.suggestion and printable(finding.suggestion),
         )
         for finding in findings
     ]
