@@ -27,7 +27,7 @@ def judge(spec: CheckSpec, renderer: str, against: str, comparison: Comparison) 
     if not all(math.isfinite(x) for x in (comparison.value, comparison.expected, tolerance)):
         return unmeasured(spec, renderer, against, Verdict.ERROR, "the measurement is not finite")
     unit = Observable(spec.observable).unit
-    known = next((k for k in spec.known if k.renderer == renderer), None)
+    known = next((k for k in spec.known if k.renderer in (renderer, against)), None)
     status, reason = _status(within, error, tolerance, unit, comparison.fault, known)
     return Check(
         id=check_id(spec, renderer, against), renderer=renderer, against=against,
