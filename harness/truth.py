@@ -77,7 +77,8 @@ class ClosedForm:
         ior = np.array([medium.ior for medium in scene.media])
         sigma = np.array([medium.absorption for medium in scene.media])
         chords = [body.chord(o, d) for body in bodies]
-        inside = np.array([(c.t_in < 0) & (c.t_out > 0) for c in chords]).reshape(len(bodies), m)
+        within = [(c.t_in < 0) & (c.t_out > 0) for c in chords]
+        inside = np.array(within, bool).reshape(len(bodies), m)
         medium = np.full(m, scene.camera.medium, np.intp)
 
         for k, letter in enumerate(path):
