@@ -44,28 +44,31 @@ def decode(pixels: NDArray[np.float32], cells: int, amplitude: float, quantum: f
     """Positions from `pixels` (..., 3), whose values are off by at most `quantum`.
 
     With c = r / b and f = g / b the cell is round(c cells - f) and the coordinate (cell + f) /
-    cells. Errors of r, g, b of at most q give |dc| <= q (1 + c) / b and |df| <= q (1 + f) / b, so
-    c cells - f strays from an integer by at most q (cells (1 + c) + 1 + f) / b: more than that is
-    a mixture of paths, and more than 1/4 cannot be told from the neighbouring cell.
+    cells. Errors of r, g, b of at most q give |dc| <= q (1 + c) / (b - q) with the measured c and
+    b, and df alike, so c cells - f strays from an integer by at most q (cells (1 + c) + 1 + f) /
+    (b - q): more than that is a mixture of paths, and more than 1/4 cannot be told from the
+    neighbouring cell.
     """
     r, g, b = (pixels[..., k].reshape(-1).astype(np.float64) for k in range(3))
     finite = np.isfinite(r) & np.isfinite(g) & np.isfinite(b)
     # Four quanta of light is where a pixel is lit for certain; see `lit_threshold`.
     lit = finite & (b > lit_threshold(quantum))
     safe = np.where(lit, b, 1.0)
-    c, f = r / safe, g / safe
-    slack = quantum * (cells * (1 + c) + 1 + f) / safe
+    c, f = np.where(lit, r, 0.0) / safe, np.where(lit, g, 0.0) / safe
+    share = quantum / np.where(lit, b - quantum, 1.0)
+    fine_error = share * (1 + np.abs(f))
+    slack = share * cells * (1 + np.abs(c)) + fine_error
     position = c * cells - f
     cell = np.round(position)
     reason = np.full(len(b), Reason.OK, np.int8)
     reason[lit & (np.abs(position - cell) > slack)] = Reason.MIXED
-    reason[lit & ((f < -slack / cells) | (f > 1 + slack / cells))] = Reason.MIXED
+    reason[lit & ((f < -fine_error) | (f > 1 + fine_error))] = Reason.MIXED
     reason[lit & (slack > 0.25)] = Reason.FAINT
     reason[finite & ~lit] = Reason.DARK
     reason[~finite] = Reason.NOT_FINITE
     ok = reason == Reason.OK
     coordinate = np.where(ok, (cell + f) / cells, np.nan)
-    uncertainty = np.where(ok, quantum * (1 + f) / (safe * cells), np.nan)
+    uncertainty = np.where(ok, fine_error / cells, np.nan)
     return Decoded(coordinate, uncertainty, np.where(finite, b, np.nan) / amplitude, reason)
 
 
@@ -77,8 +80,10 @@ def lit_threshold(quantum: float) -> float:
 def finest_cells(quantum: float, weakest: float, wanted: int) -> int:
     """The largest number of cells, at most `wanted`, that decodes down to the level `weakest`.
 
-    From `decode`: slack = quantum (2 cells + 2) / level <= 1/4 in the worst place (c = f = 1).
+    From `decode`: slack <= 1/4 in the worst place, c = f = 1, where light of that level may be
+    measured as level - quantum and c and f as (level + quantum) / (level - quantum).
     """
     if quantum <= 0:
         return wanted
-    return int(max(1, min(wanted, weakest / (8 * quantum) - 1)))
+    most = (weakest - 2 * quantum) * (weakest - quantum) / (8 * quantum * weakest) - 1
+    return int(max(1, min(wanted, most)))
