@@ -71,3 +71,16 @@ IMAGE_OBSERVABLES = frozenset(
         Observable.RADIANCE,
     }
 )
+
+# Observables of a probe that shows light; all others of a probe show where rays went.
+LIGHT_OBSERVABLES = frozenset(
+    {
+        Observable.REFLECTANCE,
+        Observable.TRANSMITTANCE,
+        Observable.CRITICAL_ANGLE,
+        Observable.FIRST_TRANSMITTING_ANGLE,
+    }
+)
+
+# Observables of a single renderer, which have a truth; all others compare two pictures.
+TRUTH_OBSERVABLES = frozenset(Observable) - IMAGE_OBSERVABLES | {Observable.RADIANCE}

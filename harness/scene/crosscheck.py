@@ -10,12 +10,18 @@ from collections.abc import Collection, Iterator, Mapping
 from functools import cache
 
 from harness.errors import nearest
-from harness.measure.observables import Observable
+from harness.measure.observables import (
+    IMAGE_OBSERVABLES,
+    LIGHT_OBSERVABLES,
+    TRUTH_OBSERVABLES,
+    Observable,
+)
 from harness.scene.expressions import is_expression
 from harness.scene.findings import Finding, KeyPath, quoted
 
 AIR = "air"  # what surrounds everything; a scene may define it otherwise
-AGAINST = ("truth", "renderers")
+AGAINST = frozenset({"truth", "renderers"})
+OBSERVABLES = frozenset(observable.value for observable in Observable)
 BUILT_IN = frozenset({"tracer", "povray", "mitsuba", "mitsuba-exact"})
 
 MOST_NAMES = 30  # that a message lists
@@ -36,7 +42,7 @@ def cross_findings(document: Table, renderers: Collection[str] = ()) -> list[Fin
     return [
         *_repeated_names(document),
         *_media(document),
-        *_checks(document, registered_renderers() | set(renderers)),
+        *_checks(document, registered_renderers().union(renderers)),
     ]
 
 
@@ -91,25 +97,59 @@ def _media(document: Table) -> Iterator[Finding]:
     yield from _reference(("camera", "medium"), _text(camera, "medium"), known)
 
 
-def _checks(document: Table, renderers: Collection[str]) -> Iterator[Finding]:
-    names = [_text(row, "name") for _, row in _rows(document, "probes")]
+def _checks(document: Table, renderers: frozenset[str]) -> Iterator[Finding]:
     # Where a probe's own name is missing, what refers to it is not to blame.
-    probes = None if None in names else {name for name in names if name}
-    observables = [observable.value for observable in Observable]
+    rows = {_text(row, "name"): row for _, row in _rows(document, "probes")}
+    probes = None if None in rows else {name: row for name, row in rows.items() if name}
     for index, check in _rows(document, "checks"):
         path: KeyPath = ("checks", index)
-        for key, known in (
-            ("observable", observables),
-            ("against", {*AGAINST, *renderers}),
-            ("probe", probes),
-        ):
-            yield from _reference((*path, key), _text(check, key), known)
+        observable = _text(check, "observable")
+        yield from _reference((*path, "observable"), observable, OBSERVABLES)
+        yield from _reference((*path, "against"), _text(check, "against"), AGAINST | renderers)
+        yield from _reference((*path, "probe"), _text(check, "probe"), probes)
+        if observable in OBSERVABLES:
+            yield from _opponent(path, check, Observable(observable))
+            yield from _probe(path, check, Observable(observable), probes)
+        if "tolerance" in check and not check.get("derivation"):
+            expected = "where the tolerance comes from"
+            yield Finding((*path, "derivation"), "missing", None, expected)
         chosen = check.get("renderers")
         for place, renderer in enumerate(chosen if isinstance(chosen, tuple) else ()):
             if isinstance(renderer, str):
                 yield from _reference((*path, "renderers", place), renderer, renderers)
         for place, deviation in _rows(check, "known"):
             yield from _known(deviation, (*path, "known", place), renderers)
+
+
+def _opponent(path: KeyPath, check: Table, observable: Observable) -> Iterator[Finding]:
+    """Whether the observable can be compared with what the check names."""
+    against = check.get("against", "truth")
+    if (against == "truth") == (observable in TRUTH_OBSERVABLES) or not isinstance(against, str):
+        return
+    expected = "truth" if observable in TRUTH_OBSERVABLES else "renderers or a renderer's name"
+    message = f"{observable} cannot be compared with it"
+    yield Finding((*path, "against"), message, quoted(against), expected)
+
+
+def _probe(
+    path: KeyPath, check: Table, observable: Observable, probes: Mapping[str, Table] | None
+) -> Iterator[Finding]:
+    """Whether the check names a probe where it needs one, and one of the right kind."""
+    name = check.get("probe")
+    where = (*path, "probe")
+    if observable in IMAGE_OBSERVABLES:
+        if name is not None:
+            yield Finding(where, f"{observable} is measured without a probe", quoted(name))
+        return
+    if name is None:
+        expected = ", ".join(sorted(probes or ())) or "a probe that the scene defines"
+        yield Finding(where, "missing", None, expected)
+        return
+    measure = "light" if observable in LIGHT_OBSERVABLES else "position"
+    probe = probes.get(name) if probes is not None and isinstance(name, str) else None
+    if probe is not None and probe.get("measure", "position") != measure:
+        expected = f'a probe with measure = "{measure}"'
+        yield Finding(where, f"{observable} needs another probe", quoted(name), expected)
 
 
 def _known(deviation: Table, path: KeyPath, renderers: Collection[str]) -> Iterator[Finding]:

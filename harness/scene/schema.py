@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal, get_args
+from typing import Any
 
-from harness.errors import InputError, nearest
 from harness.scene.axes import MOST_COMBINATIONS, NAME, RANGE_KEYS, WORD
 from harness.scene.expand import PROSE
 from harness.scene.model import Case
 from harness.scene.resolved import ResolvedScene
 
 Schema = dict[str, Any]
-Document = Literal["case", "scene"]
-DOCUMENTS: tuple[str, ...] = get_args(Document)
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 EXPRESSION: Schema = {
@@ -25,23 +22,6 @@ EXPRESSION: Schema = {
 REPLACEABLE = frozenset({"number", "integer", "string"})
 # Keywords whose values are schemas again.
 SCHEMAS = frozenset({"items", "prefixItems", "additionalProperties", "anyOf", "oneOf", "allOf"})
-
-
-def schema(of: str = "case") -> Schema:
-    """The JSON Schema of scene files ("case") or of resolved scenes, scene.json ("scene").
-
-    Raises InputError for any other name.
-    """
-    if of == "case":
-        return case_schema()
-    if of == "scene":
-        return scene_schema()
-    raise InputError.of(
-        "unknown document",
-        value=repr(of),
-        expected=" or ".join(DOCUMENTS),
-        suggestion=nearest(of, DOCUMENTS),
-    )
 
 
 def case_schema() -> Schema:

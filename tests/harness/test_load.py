@@ -258,22 +258,52 @@ EDITS = {
         32, "checks[0].against", "unknown renderer", '"renderer"', None, "renderers",
     ),
     "unknown probe": (
-        'against = "renderers"', 'probe = "trough"',
+        'observable = "ssim"\nagainst = "renderers"',
+        'observable = "exit_point"\nprobe = "trough"',
         32, "checks[0].probe", "unknown probe", '"trough"', "through", "through",
+    ),
+    "no probe": (
+        'observable = "ssim"\nagainst = "renderers"', 'observable = "exit_point"',
+        30, "checks[0].probe", "missing", None, "through", None,
+    ),
+    "probe of another kind": (
+        'observable = "ssim"\nagainst = "renderers"',
+        'observable = "reflectance"\nprobe = "through"',
+        32, "checks[0].probe", "reflectance needs another probe", '"through"',
+        'a probe with measure = "light"', None,
+    ),
+    "probe for a picture": (
+        'against = "renderers"', 'against = "renderers"\nprobe = "through"',
+        33, "checks[0].probe", "ssim is measured without a probe", None, None, None,
+    ),
+    "picture against truth": (
+        'against = "renderers"', '',
+        30, "checks[0].against", "ssim cannot be compared with it", '"truth"',
+        "renderers or a renderer's name", None,
+    ),
+    "rays against renderers": (
+        'observable = "ssim"', 'observable = "tir"\nprobe = "through"',
+        33, "checks[0].against", "tir cannot be compared with it", '"renderers"', "truth", None,
+    ),
+    "tolerance without derivation": (
+        'against = "renderers"', 'against = "renderers"\ntolerance = 0.1',
+        30, "checks[0].derivation", "missing", None, "where the tolerance comes from", None,
     ),
     "unknown renderer of a known deviation": (
         'against = "renderers"',
+        'against = "renderers"\n'
         'known = [{ renderer = "povrey", at_least = 0, at_most = 1, cause = "it is misspelt" }]',
-        32, "checks[0].known[0].renderer", "unknown renderer", '"povrey"', None, "povray",
+        33, "checks[0].known[0].renderer", "unknown renderer", '"povrey"', None, "povray",
     ),
     "empty range of a known deviation": (
         'against = "renderers"',
+        'against = "renderers"\n'
         'known = [{ renderer = "povray", at_least = 2, at_most = 1, cause = "it is reversed" }]',
-        32, "checks[0].known[0].at_most", "less than at_least", "1", "≥ 2", None,
+        33, "checks[0].known[0].at_most", "less than at_least", "1", "≥ 2", None,
     ),
     "unknown renderer of a check": (
-        'against = "renderers"', 'renderers = ["tracer", "mitsba"]',
-        32, "checks[0].renderers[1]", "unknown renderer", '"mitsba"', None, "mitsuba",
+        'against = "renderers"', 'against = "renderers"\nrenderers = ["tracer", "mitsba"]',
+        33, "checks[0].renderers[1]", "unknown renderer", '"mitsba"', None, "mitsuba",
     ),
     "unknown name in an expression": (
         "radius = 1", 'radius = "=raduis"',

@@ -292,7 +292,7 @@ format = 1
 title = "t"
 family = "f"
 sources = ["s"]
-checks = [{{ observable = "ssim" }}]
+checks = [{{ observable = "radiance" }}]
 camera = {{ type = "perspective", origin = [0, 0, 9], target = [0, 0, 0], fov_x = 30 }}
 solids = [
   {{ name = "a", medium = "air", shape = {{ type = "mesh", file = '{name}' }} }},
@@ -388,7 +388,7 @@ format = 1
 title = "t"
 family = "f"
 sources = ["s"]
-checks = [{{ observable = "ssim" }}]
+checks = [{{ observable = "radiance" }}]
 camera = {{ type = "perspective", origin = [0, 0, 9], target = [0, 0, 0], fov_x = 30 }}
 [[surfaces]]
 name = "a"
