@@ -141,7 +141,7 @@ class CaseJudge:
             for axis in AXES
         }
         cells = min(preflight.cells, probe.cells)
-        return from_images(images, truth, cells, preflight.quantum)
+        return from_images(images, truth, cells, preflight.code_quantum)
 
 
 def _merge(curves: list[Curve], spec: model.CheckSpec, curve: Curve, renderer: str) -> None:

@@ -54,6 +54,15 @@ class Preflight:
     noisy: bool
     findings: tuple[str, ...] = ()
 
+    @property
+    def code_quantum(self) -> float:
+        """Bound on the error of a code's channels: quantum, and the renderer's own evaluation.
+
+        A coordinate u and the product cells * u are each rounded once, which shows in the fine
+        channel as cells * epsilon: the same as a quantum of epsilon in the coarse one.
+        """
+        return self.quantum + 2 * self.epsilon
+
     def facts(self) -> dict[str, float | int | str]:
         """For the record."""
         return {
@@ -82,7 +91,7 @@ def chart(width: int = 96, height: int = 64) -> ResolvedScene:
 def plane() -> Rectangle:
     """A little larger than the view, so that its ramps show all values, and off its centre."""
     frame = Frame(origin=(0.5, 0.25, 0.0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
-    return Rectangle(frame=frame, size=(6.6, 6.6))
+    return Rectangle(frame=frame, size=(6.637, 6.637))
 
 
 def ramp_scene(axis: str) -> ResolvedScene:
@@ -113,7 +122,7 @@ def preflight(renderer: Renderer, settings: RenderSettings) -> Preflight:
     if findings:
         return Preflight(np.nan, 1, np.nan, epsilon, noisy, findings)
     quantum = _quantum(images, noisy)
-    cells = finest_cells(quantum, WEAKEST, FINEST)
+    cells = finest_cells(quantum + 2 * epsilon, WEAKEST, FINEST)
     codes = {
         axis: renderer.render(code_scene(chart(), plane(), axis, cells, ""), settings)
         for axis in AXES
@@ -122,10 +131,10 @@ def preflight(renderer: Renderer, settings: RenderSettings) -> Preflight:
         # Codes are sampled at pixel centres even where pictures are not: the constant channel of
         # a bare plane tells how exact a radiance is.
         level = np.concatenate([codes[axis].pixels[..., 2].ravel() for axis in AXES])
-        quantum = max(float(np.abs(level - AMPLITUDE).max()), FLOAT32)
+        quantum = max(1.01 * float(np.abs(level - AMPLITUDE).max()), FLOAT32)
     position_error = 0.0
     for axis, true in zip(AXES, true_coordinates(chart()), strict=True):
-        decoded = decode(codes[axis].pixels, cells, AMPLITUDE, quantum)
+        decoded = decode(codes[axis].pixels, cells, AMPLITUDE, quantum + 2 * epsilon)
         error = np.abs(decoded.coordinate - true.ravel())
         if np.isnan(error).any():
             lost = f"{int(np.isnan(error).sum())} of {error.size} pixels of a bare position code"

@@ -60,7 +60,7 @@ def from_paths(paths: RayPaths) -> RayMeasurement:
 def from_images(images: Images, truth: ProbeTruth, cells: int, quantum: float) -> RayMeasurement:
     """From coded images keyed by (plane, axis). Two planes give the direction.
 
-    `quantum` is the largest error of the renderer's radiance values, from its preflight.
+    `quantum` bounds the error of the renderer's codes: `Preflight.code_quantum`.
     """
     places = [
         _place(images, index, plane, cells, quantum) for index, plane in enumerate(truth.planes)
