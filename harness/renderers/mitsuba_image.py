@@ -72,7 +72,9 @@ def render(live: Any, scene: rs.ResolvedScene, origins: Any, directions: Any) ->
 
     def visit(node: Any, stack: Any, waiting: Any, radiance: Any, active: Any) -> tuple[Any, ...]:
         si = live.ray_intersect(mi.Ray3f(node.origin, node.direction), active)
-        node.weight *= attenuation(tables.sigma(node.medium), si.t)
+        # From where the segment begins, which is OFFSET before the ray but at the camera.
+        length = si.t + dr.select(node.depth == 1, 0.0, OFFSET)
+        node.weight *= attenuation(tables.sigma(node.medium), length)
         radiance += mi.Color3d(node.weight) * glow.seen(tables, node, si, active)
 
         go = active & si.is_valid() & (node.depth < limits.depth)

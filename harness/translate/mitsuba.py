@@ -24,7 +24,7 @@ import numpy as np
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 from harness.translate.mitsuba_scale import length_scale, scaled
-from harness.translate.mitsuba_shapes import Node, affine, code_strips, fan, parts
+from harness.translate.mitsuba_shapes import Node, affine, code_strips, parts, round_mesh
 from harness.translate.mitsuba_textures import code_texture, texture
 
 # Beyond this many bounces Mitsuba plays Russian roulette, which would only add noise.
@@ -69,14 +69,19 @@ def rgb(value: rs.Rgb) -> Node:
     return {"type": "rgb", "value": list(value)}
 
 
-def absorbs(scene: rs.ResolvedScene) -> bool:
-    return any(any(medium.absorption) for medium in scene.media)
-
-
 def integrator(scene: rs.ResolvedScene) -> Node:
-    """`path`, or `volpath` where a medium absorbs, since `path` passes over media in silence."""
+    """`path`, or a volumetric one where a medium absorbs: `path` passes over media in silence.
+
+    `volpath` makes NaN where a medium absorbs some channels and others not at all (its free paths
+    are infinite in those); `volpathmis` is made for media that differ between channels.
+    """
+    absorption = [medium.absorption for medium in scene.media if any(medium.absorption)]
+    kind = "path"
+    if absorption:
+        coloured = any(len(set(channels)) > 1 for channels in absorption)
+        kind = "volpathmis" if coloured else "volpath"
     return {
-        "type": "volpath" if absorbs(scene) else "path",
+        "type": kind,
         "max_depth": scene.transport.max_depth,
         "rr_depth": max(RR_DEPTH, scene.transport.max_depth + 1),
     }
@@ -194,7 +199,7 @@ def _patterned(surface: rs.Surface, pattern: rs.Pattern) -> Node:
         case rs.Rectangle() as shape, _:
             return {**dict(parts(shape))[""], **_luminous(texture(pattern))}
         case rs.Disk() as shape, _:
-            return {**fan(shape), **_luminous(texture(pattern))}
+            return {**round_mesh(shape), **_luminous(texture(pattern))}
     raise RendererUnsupported(
         f"surface {surface.name!r}: a {surface.shape.type} has no texture coordinates for a "
         f"{pattern.type}; rectangles and disks have"

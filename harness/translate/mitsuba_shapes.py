@@ -16,9 +16,9 @@ from harness.scene import resolved as rs
 Node = dict[str, Any]
 Matrix = list[list[float]]
 
-# A disk that bears a pattern becomes a fan of triangles, since Mitsuba's disk has polar texture
-# coordinates. The chord of 1/4096 of a circle is 3e-7 of the radius away from the arc.
-FAN_SECTORS = 4096
+# A disk that bears a pattern becomes a mesh, since Mitsuba's disk has polar texture coordinates.
+# The chord of 1/4096 of a circle is 3e-7 of the radius away from the arc. A power of two.
+ROUND_CORNERS = 4096
 
 
 def affine(x: Any, y: Any, z: Any, origin: Any) -> Matrix:
@@ -93,15 +93,28 @@ def _cylinder(shape: rs.Cylinder) -> Iterator[tuple[str, Node]]:
     yield "_bottom", {"type": "disk", "to_world": affine(x, -y, -axis, bottom)}
 
 
-def fan(disk: rs.Disk) -> Node:
-    angle = np.linspace(0, 2 * math.pi, FAN_SECTORS, endpoint=False)
-    plane = np.vstack([[0.0, 0.0], np.column_stack([np.cos(angle), np.sin(angle)])])
-    rim = np.arange(FAN_SECTORS)
-    triangles = np.column_stack([0 * rim, 1 + rim, 1 + (rim + 1) % FAN_SECTORS])
+def round_mesh(disk: rs.Disk) -> Node:
+    """A disk of triangles with the texture coordinates of its bounding square.
+
+    Rings with half as many corners from one to the next inner one, as wide as a side of theirs is
+    long, so that no triangle is a sliver: in slivers single precision loses texture coordinates.
+    """
+    plane, triangles, first, radius, n = [], [], 0, 1.0, ROUND_CORNERS
+    while n > 4:
+        angle = 2 * math.pi / n * np.arange(n)
+        plane.append(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
+        j, inner = np.arange(n // 2), first + n
+        a, b, c = (first + (2 * j + k) % n for k in range(3))
+        p, q = inner + j, inner + (j + 1) % (n // 2)
+        triangles += [np.column_stack(corners) for corners in ((a, b, p), (b, q, p), (b, c, q))]
+        first, radius, n = inner, radius * (1 - 2 * math.pi / n), n // 2
+    plane.append(radius * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]))
+    triangles.append(first + np.array([(0, 1, 2), (0, 2, 3)]))
+    points = np.vstack(plane)
     vertices = np.array(disk.frame.origin) + disk.radius * (
-        plane[:, :1] * np.array(disk.frame.x) + plane[:, 1:] * np.array(disk.frame.y)
+        points[:, :1] * np.array(disk.frame.x) + points[:, 1:] * np.array(disk.frame.y)
     )
-    return _mesh(vertices, triangles, texcoords=(plane + 1) / 2)
+    return _mesh(vertices, np.vstack(triangles), texcoords=(points + 1) / 2)
 
 
 def code_strips(shape: rs.Rectangle, code: rs.PositionCode) -> Node:

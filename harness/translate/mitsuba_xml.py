@@ -19,7 +19,7 @@ from harness.translate.mitsuba_shapes import Node
 
 # What Mitsuba calls the kinds of plugins that `describe` uses.
 _TAGS = {
-    "integrator": ("path", "volpath"),
+    "integrator": ("path", "volpath", "volpathmis"),
     "sensor": ("perspective", "orthographic"),
     "film": ("hdrfilm",),
     "rfilter": ("box",),
