@@ -10,20 +10,23 @@ from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
 from harness.errors import nearest
 from harness.scene.document import value_at
 from harness.scene.findings import Finding, KeyPath, quoted
 from harness.scene.model import Case
 
 if TYPE_CHECKING:
-    from pydantic import ValidationError
     from pydantic_core import ErrorDetails
 
 Schema = Mapping[str, Any]
 
 MOST_DETAILS = 1000
 UNKNOWN_KEY = "unknown key"
+UNKNOWN_TYPE = "unknown type"
 MISSING = "missing"
+OF_KEYS = (UNKNOWN_KEY, MISSING)
 WRONG_TYPE = {
     "float_type": "a number",
     "int_type": "an integer",
@@ -44,7 +47,47 @@ BOUNDS = {
 }
 
 
-def findings_of(error: ValidationError, document: dict[str, object]) -> list[Finding]:
+def validate(document: dict[str, object]) -> tuple[Case | None, list[Finding]]:
+    """The case that a document describes, or all that is wrong with it.
+
+    Where the type of a shape, material or the like is misspelt, its values are judged as those
+    of the type that was probably meant; its keys are not.
+    """
+    found: list[Finding] = []
+    guessed_tables: set[KeyPath] = set()
+    while True:
+        try:
+            case = Case.model_validate(document)
+        except ValidationError as error:
+            reported = {finding.path for finding in found}
+            new = [
+                finding
+                for finding in _findings_of(error, document)
+                if finding.path not in reported
+                and (finding.message not in OF_KEYS or finding.path[:-1] not in guessed_tables)
+            ]
+            found += new
+            guesses = {f.path: f.suggestion for f in new if f.message == UNKNOWN_TYPE}
+            guessed_tables |= {path[:-1] for path in guesses}
+            guessed = _with_guesses(document, (), guesses)
+            if guessed == document:
+                return None, found
+            assert isinstance(guessed, dict)
+            document = guessed
+        else:
+            return (None, found) if found else (case, [])
+
+
+def _with_guesses(node: object, path: KeyPath, guesses: dict[KeyPath, str | None]) -> object:
+    """The same data with some values replaced."""
+    if isinstance(node, dict):
+        return {k: _with_guesses(value, (*path, k), guesses) for k, value in node.items()}
+    if isinstance(node, tuple):
+        return tuple(_with_guesses(value, (*path, k), guesses) for k, value in enumerate(node))
+    return guesses.get(path) or node
+
+
+def _findings_of(error: ValidationError, document: dict[str, object]) -> list[Finding]:
     """One finding per error of `Case`, without repetitions and without what follows from others."""
     details = [d for d in error.errors(include_url=False) if not _is_consequence(d)]
     details = details[:MOST_DETAILS]

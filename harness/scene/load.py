@@ -8,13 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal, get_args
 
-from pydantic import ValidationError
-
 from harness.errors import InputError, Problem, nearest
 from harness.scene.crosscheck import cross_findings
 from harness.scene.document import parse_document, read_source, value_at
 from harness.scene.expand import PROSE, Permutation, expand
-from harness.scene.explain import findings_of
+from harness.scene.explain import validate
 from harness.scene.expressions import Value, is_expression
 from harness.scene.findings import Finding, KeyPath, problems, quoted
 from harness.scene.model import Case
@@ -97,11 +95,7 @@ def _validate(
 ) -> tuple[Case | None, list[Finding]]:
     """The model of one permutation, None where it is not valid, and all that is wrong."""
     data = permutation.data
-    model, found = None, []
-    try:
-        model = Case.model_validate(data)
-    except ValidationError as error:
-        found = findings_of(error, data)
+    model, found = validate(data)
     found += cross_findings(data, renderers)
     # An expression without a value is still in its place, and has been reported.
     return model, [
