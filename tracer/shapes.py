@@ -114,6 +114,48 @@ def cylinder(center: Vec, axis: Vec, radius: float, height: float) -> Cell:
     return Cell(bounds, center, math.hypot(radius, height / 2.0))
 
 
+def cone(tip: Vec, axis: Vec, radius: float, height: float) -> Cell:
+    """Cone that opens from `tip` along the unit vector `axis` to a base of `radius`."""
+    slope = radius / height
+    base = sum(t * a for t, a in zip(tip, axis, strict=True)) + height
+    bounds = (Quadric(tip, axis, 0.0, 0.0, slope * slope), Plane(axis, base))
+    center = tuple(t + height / 2.0 * a for t, a in zip(tip, axis, strict=True))
+    return Cell(bounds, (center[0], center[1], center[2]), math.hypot(radius, height / 2.0))
+
+
+def lens(
+    front: Vec,
+    axis: Vec,
+    radii: tuple[float, float],
+    thickness: float,
+    aperture: float,
+    conics: tuple[float, float] = (0.0, 0.0),
+) -> Cell:
+    """Lens with its front vertex at `front`, its optical axis along the unit vector `axis`.
+
+    `radii` of curvature are positive where the centre lies in the direction of `axis`, infinite
+    for a plane: a biconvex lens has (+, -). A lens that is hollow on a side is no convex solid
+    and is refused. `aperture` is the radius of the cylinder that is its edge; `conics` are the
+    conic constants: 0 a sphere, -1 a paraboloid, below -1 a hyperboloid.
+    """
+    if not (radii[0] > 0.0 and (radii[1] < 0.0 or radii[1] == INF)):
+        raise SceneError(f"a lens must be convex or plane on both sides, not {radii}")
+    back = tuple(f + thickness * a for f, a in zip(front, axis, strict=True))
+    reverse = (-axis[0], -axis[1], -axis[2])
+    sides = (front, axis, radii[0], conics[0]), (back, reverse, -radii[1], conics[1])
+    bounds: list[Plane | Quadric] = [Quadric(front, axis, aperture * aperture, 0.0, 0.0)]
+    for vertex, inwards, radius, conic in sides:
+        v = (vertex[0], vertex[1], vertex[2])
+        if abs(radius) == INF:
+            outwards = (-inwards[0], -inwards[1], -inwards[2])
+            bounds.append(Plane(outwards, sum(o * p for o, p in zip(outwards, v, strict=True))))
+        else:
+            bounds.append(Quadric(v, inwards, 0.0, 2.0 * radius, -(1.0 + conic)))
+    center = tuple((f + b) / 2.0 for f, b in zip(front, back, strict=True))
+    ball = math.hypot(aperture, thickness / 2.0)
+    return Cell(tuple(bounds), (center[0], center[1], center[2]), ball)
+
+
 # --- rows of numbers ------------------------------------------------------------------------------
 
 

@@ -7,37 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from tracer.camera import Perspective
+from tests.tracer.scenes import CAMERA, GLASS, X, Y, Z, angles, cube, cube_mesh, prism, slab, wall
 from tracer.errors import SceneError
-from tracer.mesh import Mesh
 from tracer.path import CUT, HIT, MISS, TIR, follow
-from tracer.patterns import Constant
-from tracer.scene import Emissive, Medium, Mirror, Scene, Solid, Surface, ThinSlab
-from tracer.shapes import Cell, Plane, Rectangle, Sphere, polyhedron
-
-GLASS = Medium(1.5)
-CAMERA = Perspective((0.0, 0.0, 9.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 1.0)
-X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-
-
-def wall(z: float, size: float = 1000.0) -> Surface:
-    return Surface(
-        Rectangle((0.0, 0.0, z), X, Y, Z, (size, size)), Emissive(Constant((1.0, 1.0, 1.0)))
-    )
-
-
-def slab(thickness: float, half: float = 100.0) -> Cell:
-    """Front face at z = 0, back at z = -thickness."""
-    planes = [
-        Plane((0.0, 0.0, 1.0), 0.0),
-        Plane((0.0, 0.0, -1.0), thickness),
-        Plane((1.0, 0.0, 0.0), half),
-        Plane((-1.0, 0.0, 0.0), half),
-        Plane((0.0, 1.0, 0.0), half),
-        Plane((0.0, -1.0, 0.0), half),
-    ]
-    corners = [(x, y, z) for x in (-half, half) for y in (-half, half) for z in (-thickness, 0.0)]
-    return polyhedron(planes, corners)
+from tracer.scene import Medium, Mirror, Scene, Solid, Surface, ThinSlab
+from tracer.shapes import Rectangle, Sphere
 
 
 def fan(degrees: np.ndarray, height: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
@@ -45,10 +19,6 @@ def fan(degrees: np.ndarray, height: float = 0.5) -> tuple[np.ndarray, np.ndarra
     theta = np.radians(degrees)
     directions = np.stack([np.sin(theta), np.zeros_like(theta), -np.cos(theta)], axis=1)
     return np.tile([0.0, 0.0, height], (len(theta), 1)), directions
-
-
-def angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
 
 
 ANGLES = np.linspace(0.0, 80.0, 161)
@@ -97,22 +67,6 @@ def test_thin_slab_does_to_a_ray_what_a_slab_does(from_behind: bool) -> None:
     assert np.abs(ours.point - real.point).max() <= 1e-14
     assert ours.weight == pytest.approx(real.weight, rel=1e-14)
     assert ours.optical_length == pytest.approx(real.optical_length, rel=1e-14)
-
-
-def prism(apex_degrees: float) -> Cell:
-    """Apex edge along y at the origin, opening towards -x; faces at half the apex angle."""
-    half = math.radians(apex_degrees / 2)
-    up, down = (math.sin(half), 0.0, math.cos(half)), (math.sin(half), 0.0, -math.cos(half))
-    planes = [
-        Plane(up, 0.0),
-        Plane(down, 0.0),
-        Plane((-1.0, 0.0, 0.0), 10.0),
-        Plane((0.0, 1.0, 0.0), 10.0),
-        Plane((0.0, -1.0, 0.0), 10.0),
-    ]
-    z = 10.0 * math.tan(half)
-    corners = [(x, y, q) for y in (-10.0, 10.0) for x, q in ((0.0, 0.0), (-10.0, z), (-10.0, -z))]
-    return polyhedron(planes, corners)
 
 
 @pytest.mark.parametrize(("apex", "ior"), [(60.0, 1.5), (40.0, 1.5), (45.0, 1.785)])
@@ -184,28 +138,15 @@ def test_mirror_takes_an_r() -> None:
     assert found.direction[0] == pytest.approx((0.6, 0.0, 0.8), abs=1e-16)
 
 
-def cube_mesh() -> Mesh:
-    v = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    t = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
-    return Mesh(v, t)
-
-
 def test_polygons_and_planes_bound_the_same_cube() -> None:
     """The rays hit faces, edges, diagonals and corners exactly."""
-    planes = [
-        Plane(tuple(s * float(k == axis) for k in range(3)), 1.0)  # type: ignore[arg-type]
-        for axis in range(3)
-        for s in (-1.0, 1.0)
-    ]
-    cube = polyhedron(planes, [tuple(v) for v in cube_mesh().vertices])
     x, y = np.meshgrid(np.linspace(-0.96, 0.96, 49), np.linspace(-0.96, 0.96, 49))
     origins = np.stack([x.ravel(), y.ravel(), np.full(x.size, 3.0)], axis=1)
     tilt = np.tile([0.1, -0.2, -math.sqrt(1 - 0.05)], (x.size, 1))
     for directions in (np.tile([0.0, 0.0, -1.0], (x.size, 1)), tilt):
         for path in ("TT", "TRT", "TRRT"):
             a = follow(
-                Scene(CAMERA, (Solid(cube, GLASS),), (wall(-9.0),)), origins, directions, path
+                Scene(CAMERA, (Solid(cube(), GLASS),), (wall(-9.0),)), origins, directions, path
             )
             b = follow(
                 Scene(CAMERA, (Solid(cube_mesh(), GLASS),), (wall(-9.0),)),
