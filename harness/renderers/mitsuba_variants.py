@@ -121,7 +121,7 @@ def version_in(path: Path) -> int | None:
     libLLVM.so.19.1, libLLVM-19.so.1, llvm-19/lib/libLLVM.so, llvm@19/lib/libLLVM.dylib,
     Cellar/llvm/19.1.7/lib/libLLVM.dylib.
     """
-    forms = (r"libLLVM-(\d+)", r"libLLVM\.so\.(\d+)", r"llvm[-@/]?(\d+)[^/]*/lib")
+    forms = (r"llvm[-@/]?(\d+)[^/]*/lib", r"libLLVM-(\d+)", r"libLLVM\.so\.(\d\d+)")
     for form in forms:
         if match := re.search(form, str(path)):
             return int(match[1])

@@ -194,15 +194,15 @@ def _luminous(radiance: Node) -> Node:
 def _patterned(surface: rs.Surface, pattern: rs.Pattern) -> Node:
     """A face that emits `pattern` over its texture coordinates."""
     match surface.shape, pattern:
-        case rs.Rectangle() as shape, rs.PositionCode() as code:
-            return {**code_strips(shape, code), **_luminous(code_texture(code))}
-        case rs.Rectangle() as shape, _:
-            return {**dict(parts(shape))[""], **_luminous(texture(pattern))}
-        case rs.Disk() as shape, _:
-            return {**round_mesh(shape), **_luminous(texture(pattern))}
+        case rs.Rectangle() as face, rs.PositionCode() as code:
+            return {**code_strips(face, code), **_luminous(code_texture(code))}
+        case rs.Rectangle() as face, rs.Checker() | rs.Ramp() | rs.Picture() as picture:
+            return {**dict(parts(face))[""], **_luminous(texture(picture))}
+        case rs.Disk() as face, rs.Checker() | rs.Ramp() | rs.Picture() as picture:
+            return {**round_mesh(face), **_luminous(texture(picture))}
     raise RendererUnsupported(
-        f"surface {surface.name!r}: a {surface.shape.type} has no texture coordinates for a "
-        f"{pattern.type}; rectangles and disks have"
+        f"surface {surface.name!r}: Mitsuba's {surface.shape.type} has no texture coordinates for "
+        f"a {pattern.type}"
     )
 
 

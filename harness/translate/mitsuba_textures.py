@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 from harness.translate.mitsuba_shapes import Matrix, Node, affine
 
 
-def texture(pattern: rs.Pattern) -> Node:
-    """A texture over (u, v). Raises RendererUnsupported where `pattern` is not one texture."""
+def texture(pattern: rs.Checker | rs.Ramp | rs.Picture) -> Node:
+    """The pattern over (u, v)."""
     match pattern:
         case rs.Checker():
             # 2 x 2 texels, repeated
@@ -32,7 +31,6 @@ def texture(pattern: rs.Pattern) -> Node:
             return _bitmap(
                 picture_pixels(pattern)[::-1], "nearest", "clamp", _uv_map((1, 1), (0, 0))
             )
-    raise RendererUnsupported(f"no texture for a {pattern.type}")
 
 
 def _bitmap(pixels: Any, filter_type: str, wrap_mode: str, to_uv: Matrix) -> Node:
