@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from harness import plan
 from harness.measure import light_observables, radiance, ray_observables
 from harness.measure.comparison import Comparison, Unmeasurable
@@ -141,7 +143,9 @@ class CaseJudge:
             for axis in AXES
         }
         cells = min(preflight.cells, probe.cells)
-        return from_images(images, truth, cells, preflight.code_quantum)
+        alone = Capability.LOBE_SWITCH in contender.capabilities
+        mixed = np.zeros(len(truth.grazing), bool) if alone else truth.ambiguous
+        return from_images(images, truth, cells, preflight.code_quantum, mixed, preflight.samples)
 
 
 def _merge(curves: list[Curve], spec: model.CheckSpec, curve: Curve, renderer: str) -> None:

@@ -8,6 +8,8 @@ differences, so it knows curvature, grazing incidence and the neighbourhood of t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +73,22 @@ class ProbeTruth:
     point: Condition
     direction: Condition
     weight: Condition
+
+    @cached_property
+    def ambiguous(self) -> NDArray[np.bool_]:
+        """(m,) rays of which another part lands on a plane too, by a path no longer than this one.
+
+        Only a renderer that cannot switch lobes off shows it, and then both codes mix: near the rim
+        of a ball, for one, what is reflected goes on to the backdrop behind it.
+        """
+        exact, found = ClosedForm(self.scene), np.zeros(len(self.grazing), bool)
+        for count in range(len(self.path) + 1):
+            for letters in product("TR", repeat=count):
+                if (other := "".join(letters)) != self.path:
+                    paths = exact.follow(self.rays, other)
+                    for plane in self.planes:
+                        found |= exact.land(paths, plane).status == Status.HIT
+        return found
 
     @property
     def theta_i(self) -> Float:

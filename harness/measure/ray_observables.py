@@ -163,10 +163,10 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, precision: Precis
 def tir(truth: ProbeTruth, rays: RayMeasurement, _precision: Precision) -> Comparison:
     """Rays lit where there is total internal reflection, or dark where light must pass."""
     fate = truth.paths.status
-    clear = ~truth.grazing & ~rays.faint & np.isin(fate, (Status.HIT, Status.TIR))
+    clear = ~truth.grazing & ~rays.faint & ~rays.mixed & np.isin(fate, (Status.HIT, Status.TIR))
     if not (clear & (fate == Status.TIR)).any() or not (clear & (fate == Status.HIT)).any():
         raise Unmeasurable("the probe does not hold both transmitted and totally reflected rays")
-    on_plane = truth.landings[0].status == Status.HIT
+    on_plane = np.all([landing.status == Status.HIT for landing in truth.landings], axis=0)
     lit = rays.seen | rays.undecided
     leaked = clear & (fate == Status.TIR) & lit
     lost = clear & (fate == Status.HIT) & on_plane & ~lit
@@ -293,15 +293,16 @@ def _used(
     # A ray that meets fewer interfaces than the path has goes another way, and may well be seen.
     elsewhere = truth.paths.status == Status.MISS
     nowhere = ~elsewhere & np.all([x.status != Status.HIT for x in truth.landings], axis=0)
-    owed = landed & ~truth.grazing & ~rays.faint
+    clear = ~truth.grazing & ~rays.mixed
+    owed = landed & clear & ~rays.faint
     lost = owed & ~rays.seen
-    ghosts = nowhere & ~truth.grazing & (rays.seen | rays.undecided)
+    ghosts = nowhere & clear & (rays.seen | rays.undecided)
     faults = []
     if lost.any():
         faults.append(f"{int(lost.sum())} of {int(owed.sum())} rays did not arrive")
     if ghosts.any():
         faults.append(f"{int(ghosts.sum())} pixels are lit that no ray should reach")
-    used = landed & ~truth.grazing & rays.seen
+    used = landed & clear & rays.seen
     if not used.any():
         raise Unmeasurable(
             "no ray could be measured: " + ("; ".join(faults) or f"pixels: {rays.reasons}")
@@ -311,6 +312,7 @@ def _used(
         "lost": int(lost.sum()),
         "ghosts": int(ghosts.sum()),
         "excluded_grazing": int((landed & truth.grazing).sum()),
+        "excluded_mixed": int((landed & rays.mixed).sum()),
         "excluded_faint": int((landed & rays.faint & ~rays.seen).sum()),
         "method": rays.method,
     }

@@ -35,6 +35,7 @@ class RayMeasurement:
     seen: NDArray[np.bool_]
     undecided: NDArray[np.bool_]
     faint: NDArray[np.bool_]
+    mixed: NDArray[np.bool_]
     point_uncertainty: Float
     direction_uncertainty: Float
     reasons: dict[str, int]
@@ -53,14 +54,23 @@ def from_paths(paths: RayPaths) -> RayMeasurement:
     missing = ~seen[:, None]
     return RayMeasurement(
         np.where(missing, np.nan, paths.point), np.where(missing, np.nan, paths.direction),
-        seen, nothing, nothing, none, none, names, "ray API",
+        seen, nothing, nothing, nothing, none, none, names, "ray API",
     )  # fmt: skip
 
 
-def from_images(images: Images, truth: ProbeTruth, cells: int, quantum: float) -> RayMeasurement:
+def from_images(
+    images: Images,
+    truth: ProbeTruth,
+    cells: int,
+    quantum: float,
+    mixed: NDArray[np.bool_],
+    samples: int | None,
+) -> RayMeasurement:
     """From coded images keyed by (plane, axis). Two planes give the direction.
 
-    `quantum` bounds the error of the renderer's codes: `Preflight.code_quantum`.
+    `quantum` bounds the error of the renderer's codes: `Preflight.code_quantum`. `mixed` (m,) are
+    the rays that share their pixels with another path, `samples` the number of times that a
+    sampling renderer chose among them.
     """
     places = [
         _place(images, index, plane, cells, quantum) for index, plane in enumerate(truth.planes)
@@ -80,10 +90,21 @@ def from_images(images: Images, truth: ProbeTruth, cells: int, quantum: float) -
     weakest = truth.paths.weight * truth.landings[0].transmission.min(axis=1) * AMPLITUDE
     # `decode` needs slack <= 1/4 in the worst place of a cell; half of that light is not demanded.
     needed = max(lit_threshold(quantum), 8 * quantum * (cells + 1))
+    faint = weakest < 2 * needed
+    if samples is not None:
+        faint |= weakest < AMPLITUDE * surely_sampled(samples, len(faint))
     return RayMeasurement(
-        point, direction, seen, undecided, weakest < 2 * needed, uncertainty,
+        point, direction, seen, undecided, faint, mixed, uncertainty,
         direction_uncertainty, reasons, f"position code, {cells} cells",
     )  # fmt: skip
+
+
+def surely_sampled(samples: int, rays: int) -> float:
+    """The weight of a path that misses no ray at all but once in 10,000 probes.
+
+    A path of weight w is never chosen in N samples with a chance of (1 - w)^N.
+    """
+    return float(1 - (1e-4 / rays) ** (1 / samples))
 
 
 def _place(
