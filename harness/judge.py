@@ -112,7 +112,7 @@ class CaseJudge:
             return RAYS[observable](truth, self._measured(contender, probe), precision)
         pixels = self._results.picture(contender, plan.light_role(probe))
         if observable in BOUNDARIES:
-            return BOUNDARIES[observable](truth, pixels, preflight.quantum)
+            return BOUNDARIES[observable](truth, pixels, preflight.quantum, preflight.noisy)
         n2 = Capability.RADIANCE_N2 in contender.capabilities
         if preflight.noisy:
             return light_observables.sampled_path_weight(truth, pixels, FALSE_ALARM, n2)

@@ -30,7 +30,8 @@ from harness.renderers.base import Capability, Image, Renderer, RenderSettings
 
 # The weakest light a probe path is expected to leave; codes are made as fine as it allows.
 WEAKEST = 0.3
-FINEST = 4096
+# Odd, so that what is symmetric does not fall on the border between two cells.
+FINEST = 4095
 # The largest error of a radiance that an honest image can have: half a step of 8 bits where sRGB is
 # steepest, and a percent. A renderer that is further off is wrong, not coarse.
 COARSEST = 1.01 * 0.5 / 255 * 2.4 / 1.055

@@ -75,11 +75,11 @@ def critical_angle(truth: ProbeTruth, pixels: NDArray[np.float32], quantum: floa
     ior = [medium.ior for medium in truth.scene.media]
     solid = truth.scene.solids[0]
     closed = expected.critical_angle(ior[solid.medium], ior[solid.exterior])
-    return _boundary(truth, pixels, quantum, closed, lit_below=True)
+    return _boundary(truth, pixels, quantum, over_area, closed, lit_below=True)
 
 
 def first_transmitting_angle(
-    truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float
+    truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float, over_area: bool
 ) -> Comparison:
     """Smallest angle of incidence at which a prism transmits, degrees, in its principal plane."""
     from harness.measure.ray_observables import apex_angle, principal
@@ -92,13 +92,14 @@ def first_transmitting_angle(
     closed = expected.prism_first_transmitting_angle(
         apex_angle(truth, used), ior[solid.medium] / ior[solid.exterior]
     )
-    return _boundary(truth, pixels, quantum, closed, lit_below=False)
+    return _boundary(truth, pixels, quantum, over_area, closed, lit_below=False)
 
 
 def _boundary(
     truth: ProbeTruth,
     pixels: NDArray[np.float32],
     quantum: float,
+    over_area: bool,
     closed: float,
     lit_below: bool,
 ) -> Comparison:
@@ -106,7 +107,8 @@ def _boundary(
 
     The angle is known to half the distance between the last lit and the first dark ray. A ray so
     near the limit that it carries less light than the image can show looks dark, so the true curve
-    is put through the same threshold.
+    is put through the same threshold. A renderer that samples `over_area` lights a pixel of which
+    any part is lit, half a pixel further out.
     """
     light = pixels.reshape(-1, 3).min(axis=1).astype(np.float64)
     threshold = lit_threshold(quantum)
@@ -128,6 +130,7 @@ def _boundary(
     tolerance = (high - low) / 2 + (np.ptp(theta[faint]) if faint.sum() > 1 else 0)
     spacing = float(np.abs(np.diff(theta)).max())
     tolerance = max(float(tolerance), spacing / 2) + (spacing if faint.any() else 0)
+    tolerance += spacing / 2 if over_area else 0
     ordered = bool(low < high)
     within = ordered and abs(value - closed) <= tolerance
     return Comparison(

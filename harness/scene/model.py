@@ -301,14 +301,18 @@ class Probe(Strict):
     ]
     planes: Annotated[tuple[Rectangle, ...], Field(min_length=1, max_length=2)]
     measure: Literal["position", "light"] = "position"
-    cells: Annotated[int, Field(ge=1, le=16384)] = 4096
+    cells: Annotated[int, Field(ge=1, le=16383)] = 4095
 
 
 # --- checks ---------------------------------------------------------------------------------------
 
 
 class Known(Strict):
-    """A documented deviation of a renderer: KNOWN while the value stays in [at_least, at_most]."""
+    """A documented deviation of a renderer: KNOWN while its size stays in [at_least, at_most].
+
+    When it is gone the check fails, because the scene is out of date; `at_least` 0 says that it
+    shows in some permutations only.
+    """
 
     renderer: str
     at_least: Finite
