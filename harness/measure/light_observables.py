@@ -70,7 +70,9 @@ def sampled_path_weight(
     return binned(pixels.reshape(-1, 3).astype(np.float64), true, order, level)
 
 
-def critical_angle(truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float) -> Comparison:
+def critical_angle(
+    truth: ProbeTruth, pixels: NDArray[np.float32], quantum: float, over_area: bool
+) -> Comparison:
     """Angle of incidence at which light stops passing, degrees, between lit and dark pixels."""
     ior = [medium.ior for medium in truth.scene.media]
     solid = truth.scene.solids[0]
