@@ -31,6 +31,7 @@ LAYERS = (
     ("renderers",),
     ("probe",),
     ("measure",),
+    ("chart",),
     ("verdict", "preflight"),
     ("report",),
     ("plan", "results", "pairs", "judge", "archive", "lanes", "run"),
