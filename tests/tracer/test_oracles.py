@@ -84,7 +84,7 @@ def by_rayoptics(
         transform = np.identity(3), np.array([0.0, 0.0, to_next])
         path.append((surface.Surface(profile=profile), None, transform, ior, 1))
     rays, *_ = raytrace.trace_raw(iter(path), origin, direction, 550.0)
-    last = np.array(rays[-1][0]) + [0.0, 0.0, surfaces[-1][1]]
+    last = np.array(rays[-1][0]) + np.array([0.0, 0.0, surfaces[-1][1]])
     return last, np.array(rays[-1][1])
 
 
