@@ -15,16 +15,18 @@ def judge(spec: CheckSpec, renderer: str, against: str, comparison: Comparison) 
 
     A tolerance that the scene states replaces the derived one and is held against the worst ray or
     pixel. A documented deviation is KNOWN only while its size stays within its stated bounds, and
-    FAILs when it is gone: then the scene is out of date.
+    FAILs when it is gone: then the scene is out of date. What a comparison calls a fault is none
+    that any tolerance or document excuses.
     """
     tolerance, derivation = comparison.tolerance, comparison.derivation
-    within = comparison.within
+    within = comparison.within and not comparison.fault
     error = abs(comparison.value - comparison.expected)
+    largest = float(comparison.detail.get("max", error))
     if spec.tolerance is not None:
         tolerance, derivation = spec.tolerance, spec.derivation
-        error = max(error, float(comparison.detail.get("max", error)))
+        error = max(error, largest)
         within = error <= tolerance and not comparison.fault
-    if not all(math.isfinite(x) for x in (comparison.value, comparison.expected, tolerance)):
+    if not all(math.isfinite(x) for x in (error, largest, tolerance)):
         return unmeasured(spec, renderer, against, Verdict.ERROR, "the measurement is not finite")
     unit = Observable(spec.observable).unit
     known = next((k for k in spec.known if k.renderer in (renderer, against)), None)
@@ -43,7 +45,7 @@ def _status(
     size = f"off by {error:.3g} {unit}".rstrip()
     if within and known is None:
         return Verdict.PASS, ""
-    if known is None:
+    if known is None or fault:
         times = f", {error / tolerance:.3g} times the tolerance" if tolerance > 0 else ""
         said = f"{size}{times}" if error > tolerance else "within tolerance where measured"
         return Verdict.FAIL, f"{said}; {fault}" if fault else said
