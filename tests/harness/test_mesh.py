@@ -89,6 +89,10 @@ def test_edges_of_more_than_two_faces_are_found() -> None:
     vertices = np.vstack([CUBE, [[0.5, -1, -1]]])
     two_sided = np.vstack([TRIANGLES, [[0, 1, 8], [1, 0, 8]]])
     assert only(vertices, two_sided).startswith("duplicate face: 13 (1, 0, 8) as face 12")
+    fin = closed_solid_problems(vertices, np.vstack([TRIANGLES, [[0, 1, 8]]]))
+    assert [problem.split(":")[0] for problem in fin] == [
+        "hole along edge", "edge of more than two faces",
+    ]  # fmt: skip
     second = CUBE * [1, -1, -1]  # turned by 180 degrees about the edge 0-1, which both share
     joined = np.where(TRIANGLES < 2, TRIANGLES, TRIANGLES + 6)
     problem = only(np.vstack([CUBE, second[2:]]), np.vstack([TRIANGLES, joined]))

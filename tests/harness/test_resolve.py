@@ -174,6 +174,16 @@ def test_quarter_turns_are_exact() -> None:
     assert [bound.tolist() for bound in bounds(turned)] == [[-1, 0, -2], [3, 2, 4]]
 
 
+def test_turns_are_right_handed() -> None:
+    # About x, y turns to z and z to -y; about a diagonal, x turns to y.
+    slab = {"type": "slab", "thickness": 1, "size": [2, 2]}
+    turned = solid({**slab, "rotate": [{"axis": [3, 0, 0], "angle": 90}]})
+    assert turned.planes[5] == (0, -1, 0, 0)
+    prism = {"type": "prism", "apex_angle": 60, "side": 1, "length": 1}
+    turned = solid({**prism, "rotate": [{"axis": [1, 1, 1], "angle": 120}]})
+    assert turned.planes[2][:3] == pytest.approx((0, -1, 0), abs=2 * EPS)
+
+
 def test_rotations_follow_each_other_about_the_centre() -> None:
     # x to y by the turn about z, then y to z by the turn about x.
     turns = [{"axis": [0, 0, 5], "angle": 90}, {"axis": [1, 0, 0], "angle": 90}]
@@ -495,6 +505,13 @@ ICO: Document = {"type": "icosphere", "radius": 1, "subdivisions": 2}
 ROD: Document = {"type": "cylinder", "radius": 0.5, "height": 4}
 PANE: Document = {"type": "slab", "thickness": 0.1, "size": [20, 20]}
 SIDEWAYS: Document = {**PANE, "normal": [1, 0, 0], "center": [0.05, 0, 0]}
+# Only edges and faces tell that it crosses the pane; no sample point of either is in the other.
+CROSSING: Document = {**PANE, "normal": [1, 0, 0], "center": [1.3, 0.7, 0.9]}
+
+# A slab with the normal n = (1, 2, 2) / 3, and a ball 1 - 1e-4 before it, 9 u from its centre
+# with u = (2, -2, 1) / 3 across n.
+TILTED: Document = {"type": "slab", "normal": [1, 2, 2], "thickness": 1, "size": [50, 50]}
+BESIDE = sphere(1, 0.9999 / 3 + 6, 1.9998 / 3 - 6, 1.9998 / 3 + 3)
 
 OVERLAPS = [
     (sphere(1), sphere(1, 1.5)),
@@ -502,10 +519,13 @@ OVERLAPS = [
     (sphere(2), sphere(1, 1.5)),
     (sphere(1), sphere(1)),
     (sphere(1, z=1.04), box([50, 50, 0.1])),
-    (sphere(1, z=1.0499), box([50, 50, 0.1])),  # through the middle of a face, by 1e-4
+    (BESIDE, TILTED),  # through a face, by 1e-4, where no sample point lies
     (sphere(1), box([1.9, 1.9, 1.9])),  # corners stick out of the sphere
     (sphere(1), box([3, 0.5, 0.5])),
     (PANE, SIDEWAYS),
+    (PANE, CROSSING),
+    ({"type": "polygons", "of": PANE}, CROSSING),
+    ({"type": "polygons", "of": PANE}, {"type": "polygons", "of": CROSSING}),
     (box([2, 2, 2]), box([2, 2, 2], 1, 1, 1)),
     (box([2, 2, 2]), box([2, 2, 2])),
     (box([4, 1, 1]), box([1, 4, 1])),
