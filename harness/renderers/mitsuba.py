@@ -38,14 +38,30 @@ from harness.scene.resolved import ResolvedScene
 from harness.translate.mitsuba import describe
 from harness.translate.mitsuba_scale import length_scale, scaled
 
-STOCK_CAPABILITIES = frozenset(Capability) - {
+STOCK_CAPABILITIES = frozenset(
+    {
+        Capability.IMAGE,
+        Capability.SPHERE,
+        Capability.CONVEX,
+        Capability.CYLINDER,
+        Capability.MESH,
+        Capability.SMOOTH_MESH,
+        Capability.MIRROR,
+        Capability.DIFFUSE,
+        Capability.TRANSLUCENT,
+        Capability.PICTURE,
+        Capability.ABSORPTION,
+        Capability.FRESNEL,
+        Capability.NESTED,
+        Capability.CAMERA_INSIDE,
+        Capability.RADIANCE_N2,
+    }
+)
+EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
     Capability.RAYS,
     Capability.PIXEL_CENTRES,
-    Capability.DOUBLE,
     Capability.LOBE_SWITCH,
-    Capability.THIN_SLAB,
 }
-EXACT_CAPABILITIES = frozenset(Capability) - {Capability.DOUBLE, Capability.THIN_SLAB}
 
 # An ordinary image is the mean of this many renders with seeds of their own, which tell its
 # variance; more samples per pixel are more samples per render.
@@ -204,8 +220,8 @@ class ExactEngine(_Engine):
         super().__init__()
         if self.variant != variants.FAST:
             raise RendererMissing(
-                f"following both lobes needs Mitsuba's {variants.FAST}, but Mitsuba "
-                f"{variants.choose().note}: {variants.llvm_remedy()}"
+                f"following both lobes needs Mitsuba's {variants.FAST}, and only {self.variant} "
+                f"works here: {variants.llvm_remedy()}"
             )
 
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.translate.mitsuba_shapes import Node
 
@@ -75,12 +76,30 @@ def _mesh(mi: Any, name: str, node: Node, media: dict[str, Any]) -> Any:
         has_vertex_texcoords="texcoords" in node,
     )
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = np.ravel(node["vertices"])
-    parameters["faces"] = np.ravel(node["triangles"])
+    parameters["vertex_positions"] = _own(mi, node["vertices"])
+    parameters["faces"] = _own(mi, node["triangles"])
     if "normals" in node:
-        parameters["vertex_normals"] = np.ravel(node["normals"])
+        parameters["vertex_normals"] = _own(mi, node["normals"])
     if "texcoords" in node:
-        parameters["vertex_texcoords"] = np.ravel(node["texcoords"])
+        parameters["vertex_texcoords"] = _own(mi, node["texcoords"])
     parameters.update()
     mesh.set_id(name)
     return mesh
+
+
+def _own(mi: Any, array: NDArray[Any]) -> Any:
+    """The flat array in memory of Dr.Jit's.
+
+    Dr.Jit compiles other code for memory that is less aligned than its own, as numpy's can be: the
+    kernels of one and the same scene would differ from run to run.
+    """
+    import drjit as dr
+
+    flat = np.ravel(array)
+    if not dr.is_jit_v(mi.Float):
+        return flat
+    kind = mi.UInt32 if flat.dtype == np.uint32 else mi.Float
+    own = dr.empty(kind, len(flat))
+    dr.scatter(own, kind(flat), dr.arange(mi.UInt32, len(flat)))
+    dr.eval(own)
+    return own

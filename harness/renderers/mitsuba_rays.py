@@ -79,6 +79,7 @@ def trace(live: Any, scene: rs.ResolvedScene, rays: Rays, path: str) -> RayPaths
     )
     state = (dr.zeros(mi.UInt32, n), start, dr.full(mi.Bool, True, n))
     _, ray, _ = dr.while_loop(state, lambda *s: s[-1], step, label="trace")
+    dr.eval(ray)  # all at once, in one kernel
     status = np.array(ray.status).astype(np.int8)
     point = np.where((status == Status.HIT)[:, None], np.array(ray.point).T, np.nan)
     return RayPaths(
