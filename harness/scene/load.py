@@ -156,7 +156,7 @@ def find(
 ) -> list[LoadedCase]:
     """The cases that `selections` name, without repetitions, in the order of ids per file.
 
-    A selection is a scene file, a folder of them, a family, or a case's id in which ``*`` and
+    A selection is a scene file, a folder of them, a family, a tag, or a case's id in which ``*`` and
     ``?`` stand for any characters; a case's name without axes means all of its permutations.
     Files and folders are found from the working folder, everything else below `root`. Without
     selections, all cases below `root`.
@@ -220,7 +220,7 @@ def _select(
         problems.append(Problem("holds no scene files (*.toml)", file=root))
     for glob in globs or ["*"]:
         pattern = _pattern(glob)
-        chosen = [case for case in suite.cases if _matches(pattern, case)]
+        chosen = [c for c in suite.cases if _matches(pattern, c) or glob in c.model.tags]
         broken = [path for path in suite.broken if _may_match(pattern, glob, path)]
         _add(chosen, found, problems)
         for path in broken:

@@ -467,7 +467,8 @@ def suite(tmp_path: Path) -> Path:
 
     write("ball/plain.toml", SCENE)
     write("ball/sweep.toml", SCENE.replace("1.5", '"=n"') + "\n[axes]\nn = [1.5, 2]\n")
-    write("slab/offset.toml", SCENE.replace('family = "ball"', 'family = "parallel"'))
+    tagged = 'family = "parallel"\ntags = ["slow", "smoke"]'
+    write("slab/offset.toml", SCENE.replace('family = "ball"', tagged))
     return tmp_path
 
 
@@ -482,6 +483,7 @@ def suite(tmp_path: Path) -> Path:
         (["ball-sweep[n=2]"], ["ball-sweep[n=2]"]),
         (["*[n=?]"], ["ball-sweep[n=2]"]),
         (["*-plain", "ball-plain"], ["ball-plain"]),
+        (["smoke"], ["slab-offset"]),
     ],
 )
 def test_cases_are_found(suite: Path, selections: list[str], ids: list[str]) -> None:
