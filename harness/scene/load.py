@@ -156,8 +156,8 @@ def find(
 ) -> list[LoadedCase]:
     """The cases that `selections` name, without repetitions, in the order of ids per file.
 
-    A selection is a scene file, a folder of them, a family, a tag, or a case's id in which ``*`` and
-    ``?`` stand for any characters; a case's name without axes means all of its permutations.
+    A selection is a scene file, a folder of them, a family, a tag, or a case's id in which ``*``
+    and ``?`` stand for any characters; a case's name without axes means all of its permutations.
     Files and folders are found from the working folder, everything else below `root`. Without
     selections, all cases below `root`.
 
