@@ -23,10 +23,11 @@ from tracer.shapes import (
     bound_normal,
     cell_stretch,
     face_distance,
+    sphere_normal,
     sphere_stretch,
     vec_at,
 )
-from tracer.vector import Vec, along, dot, normalise, scale, sub
+from tracer.vector import Vec, along, dot, scale, sub
 
 NOTHING = -1
 
@@ -69,7 +70,7 @@ def nearest_hit(
         elif kind == CELL:
             t, face, entering = _cell_hit(scene, i, o, d, on_face)
         else:
-            t, face, entering = _face_hit(scene, i, o, d, kind == DISK)
+            t, face, entering = _face_hit(scene, i, o, d, kind == DISK, best)
         if t < best:
             best, hit, hit_face, hit_entering = t, i, face, entering
     return hit, hit_face, best, hit_entering
@@ -111,10 +112,12 @@ def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[floa
 
 
 @inlined
-def _face_hit(scene: Arrays, i: int, o: Vec, d: Vec, is_disk: bool) -> tuple[float, int, bool]:
+def _face_hit(
+    scene: Arrays, i: int, o: Vec, d: Vec, is_disk: bool, best: float
+) -> tuple[float, int, bool]:
     row = scene.objects[i, FIRST]
     entering = dot(d, vec_at(scene.rows, row, 9)) < 0.0
-    return face_distance(o, d, scene.rows, row, is_disk), 0, entering
+    return face_distance(o, d, scene.rows, row, is_disk, best), 0, entering
 
 
 @inlined
@@ -126,7 +129,7 @@ def hit_point(
     p = along(o, t, d)
     if kind == SPHERE:
         center = vec_at(scene.rows, first, 0)
-        n = normalise(sub(p, center))
+        n = sphere_normal(p, center, scene.rows[first, 3])
         p = along(center, scene.rows[first, 3], n)  # back onto the sphere, to the last bit
     elif kind == CELL:
         n = bound_normal(p, scene.rows, first + face)

@@ -43,33 +43,51 @@ class Limits(NamedTuple):
     min_weight: float
 
 
-class Waiting(NamedTuple):
-    """Rays that wait to be followed. There are never more than `max_depth`."""
+class Ray(NamedTuple):
+    """A ray under way: what it carries, and the face that it has left (see `nearest_hit`)."""
 
-    floats: Floats  # (depth, 9): origin, direction, weight
-    ints: NDArray[np.int64]  # (depth, 5): segments, medium, left, left_face, inward
+    o: Vec
+    d: Vec
+    weight: Vec
+    segments: int
+    medium: int
+    left: int
+    left_face: int
+    inward: bool
+
+
+class Waiting(NamedTuple):
+    """Rays that wait to be followed, never more than `max_depth`."""
+
+    floats: Floats  # (depth, 9)
+    ints: NDArray[np.int64]  # (depth, 5)
 
 
 @inlined
-def _push(
-    waiting: Waiting,
-    at: int,
-    o: Vec,
-    d: Vec,
-    weight: Vec,
-    segments: int,
-    medium: int,
-    left: int,
-    left_face: int,
-    inward: bool,
-) -> None:
+def _lay_aside(waiting: Waiting, at: int, ray: Ray) -> None:
     for k in range(3):
-        waiting.floats[at, k] = o[k]
-        waiting.floats[at, 3 + k] = d[k]
-        waiting.floats[at, 6 + k] = weight[k]
+        waiting.floats[at, k] = ray.o[k]
+        waiting.floats[at, 3 + k] = ray.d[k]
+        waiting.floats[at, 6 + k] = ray.weight[k]
     ints = waiting.ints
-    ints[at, 0], ints[at, 1], ints[at, 2] = segments, medium, left
-    ints[at, 3], ints[at, 4] = left_face, inward
+    ints[at, 0], ints[at, 1], ints[at, 2] = ray.segments, ray.medium, ray.left
+    ints[at, 3], ints[at, 4] = ray.left_face, ray.inward
+
+
+@inlined
+def _take_up(waiting: Waiting, at: int) -> Ray:
+    floats, ints = waiting.floats, waiting.ints
+    o, d, weight = vec_at(floats, at, 0), vec_at(floats, at, 3), vec_at(floats, at, 6)
+    return Ray(o, d, weight, ints[at, 0], ints[at, 1], ints[at, 2], ints[at, 3], ints[at, 4] != 0)
+
+
+@inlined
+def _worth(ray: Ray, limits: Limits) -> tuple[bool, float]:
+    """(follow it, what is cut if not)."""
+    strength = max(ray.weight[0], ray.weight[1], ray.weight[2])
+    if strength > 0.0 and strength >= limits.min_weight and ray.segments <= limits.max_depth:
+        return True, 0.0
+    return False, strength
 
 
 @inlined
@@ -77,64 +95,54 @@ def radiance(
     scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
 ) -> tuple[Vec, float]:
     """(radiance that arrives at `o` against the direction `d`, weight cut); starts in medium 0."""
-    seen, cut = BLACK, 0.0
-    _push(waiting, 0, o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
-    height = 1
-    while height > 0:
-        height -= 1
-        o, d = vec_at(waiting.floats, height, 0), vec_at(waiting.floats, height, 3)
-        weight = vec_at(waiting.floats, height, 6)
-        segments, medium = waiting.ints[height, 0], waiting.ints[height, 1]
-        left, left_face = waiting.ints[height, 2], waiting.ints[height, 3]
-        inward = waiting.ints[height, 4] != 0
-
-        hit, face, t, entering = nearest_hit(scene, o, d, left, left_face, inward, stack)
-        weight = mul(weight, absorbed(scene.media, medium, t))
+    seen, cut, height = BLACK, 0.0, 0
+    ray = Ray(o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
+    while True:
+        hit, face, t, entering = nearest_hit(
+            scene, ray.o, ray.d, ray.left, ray.left_face, ray.inward, stack
+        )
+        weight = mul(ray.weight, absorbed(scene.media, ray.medium, t))
         if hit == NOTHING:
             seen = add(seen, mul(weight, vec_at(scene.background, 0, 0)))
-            continue
-        at = scatter(scene, lobes, o, t, d, medium, hit, face, entering, stack)
-        seen = add(seen, mul(weight, at.sent))
-
-        onward = mul(weight, at.reflected)
-        strength = max(onward[0], onward[1], onward[2])
-        if strength > 0.0:
-            if segments < limits.max_depth and strength >= limits.min_weight:
-                _push(
-                    waiting,
-                    height,
-                    at.p,
-                    at.wr,
-                    onward,
-                    segments + 1,
-                    at.medium,
-                    hit,
-                    face,
-                    not entering,
-                )
+        else:
+            at = scatter(scene, lobes, ray.o, t, ray.d, ray.medium, hit, face, entering, stack)
+            seen = add(seen, mul(weight, at.sent))
+            reflected = Ray(
+                at.p,
+                at.wr,
+                mul(weight, at.reflected),
+                ray.segments + 1,
+                at.medium,
+                hit,
+                face,
+                not entering,
+            )
+            transmitted = Ray(
+                at.p_t,
+                at.wt,
+                mul(weight, at.transmitted),
+                ray.segments + at.crossed,
+                at.beyond,
+                hit,
+                face,
+                entering,
+            )
+            reflects, lost_r = _worth(reflected, limits)
+            transmits, lost_t = _worth(transmitted, limits)
+            cut += lost_r + lost_t
+            if transmits and reflects:
+                _lay_aside(waiting, height, reflected)
                 height += 1
-            else:
-                cut += strength
-        onward = mul(weight, at.transmitted)
-        strength = max(onward[0], onward[1], onward[2])
-        if strength > 0.0:
-            if segments + at.crossed <= limits.max_depth and strength >= limits.min_weight:
-                _push(
-                    waiting,
-                    height,
-                    at.p_t,
-                    at.wt,
-                    onward,
-                    segments + at.crossed,
-                    at.beyond,
-                    hit,
-                    face,
-                    entering,
-                )
-                height += 1
-            else:
-                cut += strength
-    return seen, cut
+            if transmits:
+                ray = transmitted
+                continue
+            if reflects:
+                ray = reflected
+                continue
+        if height == 0:
+            return seen, cut
+        height -= 1
+        ray = _take_up(waiting, height)
 
 
 @compiled

@@ -132,7 +132,8 @@ def by_raysect(primitives: list[Any], origin: Floats, direction: Floats) -> Floa
     world = oracle("raysect.optical").World()
     for primitive in primitives:
         primitive.parent = world
-    ray = logging.LoggingRay(core.Point3D(*origin), core.Vector3D(*direction))
+    start = core.Point3D(*origin), core.Vector3D(*direction)
+    ray = logging.LoggingRay(*start, extinction_prob=0.0)  # else it ends some rays by chance
     ray.trace(world)
     points = []
     for hit in ray.log:
