@@ -136,6 +136,8 @@ class WorkerRenderer:
 
     def emit(self, scene: ResolvedScene, folder: Path) -> Path:
         """What the engine makes of the scene where it can show it, or else scene.json."""
+        folder = folder.resolve()  # the worker's working folder is another
+        folder.mkdir(parents=True, exist_ok=True)
         scene_file = _write(scene, folder)
         if "emit" not in self._greeting().operations:
             return scene_file
