@@ -46,6 +46,7 @@ TRACER_ADAPTERS = {"harness.renderers.tracer", "harness.translate.tracer"}
 # Modules that work inside a renderer's own process and may load what that needs. To everybody else
 # they are as heavy as what they load.
 WORKER_ONLY = TRACER_ADAPTERS | {
+    "harness.renderers.mitsuba_code",
     "harness.renderers.mitsuba_image",
     "harness.renderers.mitsuba_lobes",
     "harness.renderers.mitsuba_rays",

@@ -89,6 +89,9 @@ class _Engine:
         import mitsuba as mi
 
         mi.set_variant(variant)
+        from harness.renderers.mitsuba_code import register
+
+        register()
         mi.set_log_level(mi.LogLevel.Warn)
         self.variant = variant
         self._mi = mi

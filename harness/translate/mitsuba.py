@@ -24,7 +24,7 @@ import numpy as np
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 from harness.translate.mitsuba_scale import length_scale, scaled
-from harness.translate.mitsuba_shapes import Node, affine, code_strips, parts, round_mesh
+from harness.translate.mitsuba_shapes import Node, affine, parts, round_mesh
 from harness.translate.mitsuba_textures import code_texture, texture
 
 # Beyond this many bounces Mitsuba plays Russian roulette, which would only add noise.
@@ -195,7 +195,7 @@ def _patterned(surface: rs.Surface, pattern: rs.Pattern) -> Node:
     """A face that emits `pattern` over its texture coordinates."""
     match surface.shape, pattern:
         case rs.Rectangle() as face, rs.PositionCode() as code:
-            return {**code_strips(face, code), **_luminous(code_texture(code))}
+            return {**dict(parts(face))[""], **_luminous(code_texture(code))}
         case rs.Rectangle() as face, rs.Checker() | rs.Ramp() | rs.Picture() as picture:
             return {**dict(parts(face))[""], **_luminous(texture(picture))}
         case rs.Disk() as face, rs.Checker() | rs.Ramp() | rs.Picture() as picture:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from harness.scene import resolved as rs
 from harness.translate.mitsuba_shapes import Matrix, Node, affine
 
+CODE_TEXTURE = "snellcheck_position_code"
+
 
 def texture(pattern: rs.Checker | rs.Ramp | rs.Picture) -> Node:
     """The pattern over (u, v)."""
@@ -62,6 +64,10 @@ def picture_pixels(pattern: rs.Picture) -> NDArray[np.float32]:
 
 
 def code_texture(code: rs.PositionCode) -> Node:
-    """The code over (fine, coarse): amplitude * (coarse, fine, 1)."""
-    texels = [[(row, column, 1.0) for column in (0.0, 1.0)] for row in (0.0, 1.0)]
-    return _ramp(code.amplitude * np.array(texels))
+    """The code, as the texture of ours that `harness.renderers.mitsuba_code` registers."""
+    return {
+        "type": CODE_TEXTURE,
+        "cells": float(code.cells),
+        "amplitude": code.amplitude,
+        "axis": "uv".index(code.axis),
+    }

@@ -11,11 +11,13 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from harness.errors import RendererUnsupported
 from harness.imagefile import write_exr
 from harness.record import write_text
 from harness.scene.resolved import ResolvedScene
 from harness.translate.mitsuba import describe
 from harness.translate.mitsuba_shapes import Node
+from harness.translate.mitsuba_textures import CODE_TEXTURE
 
 # What Mitsuba calls the kinds of plugins that `describe` uses.
 _TAGS = {
@@ -58,6 +60,8 @@ def _media_first(description: Node) -> list[tuple[str, Node]]:
 def _plugin(name: str, node: Node, folder: Path, naming: str, trail: str = "") -> ET.Element:
     """The element of one plugin, named by its attribute `naming`; assets are named by `trail`."""
     kind, trail = node["type"], f"{trail}-{name}" if trail else name
+    if kind == CODE_TEXTURE:
+        raise RendererUnsupported("position codes are a texture of ours: Mitsuba's XML has none")
     plugin = "ply" if kind == "mesh" else kind
     element = ET.Element(_TAG[kind], {"type": plugin, naming: name})
     if kind == "mesh":

@@ -142,24 +142,13 @@ def test_translucence_is_split_exactly() -> None:
     assert blend["tint"]["int_ior"] == blend["tint"]["ext_ior"]
 
 
-@pytest.mark.parametrize("axis", ["u", "v"])
-def test_code_strips_tell_their_own_position(axis: str) -> None:
-    """At each corner: coarse is the coordinate, fine is 0 or 1 where a cell begins or ends."""
-    plane = rectangle((0.5, -0.2, -3), (6, 4), z=(0.3, -0.2, 1), up=(0.2, 1, 0))
-    code = rs.PositionCode.model_validate({"axis": axis, "cells": 100, "amplitude": 0.9})
-    scene = make_scene(VIEW, surfaces=[(plane, rs.Emissive(pattern=code))])
-    mesh = describe(scene)["surface_0"]
-    across = np.array(plane.frame.x if axis == "u" else plane.frame.y)
-    size = plane.size[0] if axis == "u" else plane.size[1]
-    points = mesh["vertices"].astype(float)
-    coordinate = (points - np.array(plane.frame.origin)) @ across / size + 0.5
-    fine, coarse = mesh["texcoords"].astype(float).T
-    assert coarse == pytest.approx(coordinate, abs=1e-6)
-    assert (coarse * 100 - fine) == pytest.approx(np.round(coarse * 100 - fine), abs=1e-4)
-    corners = points[mesh["triangles"]]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    assert np.linalg.norm(normals, axis=1).sum() / 2 == pytest.approx(24, rel=1e-5)
-    assert (normals @ np.array(plane.frame.z) > 0).all()
+def test_a_position_code_is_a_texture_that_xml_cannot_hold(tmp_path: Path) -> None:
+    code = rs.PositionCode(axis="v", cells=100, amplitude=0.9)
+    scene = make_scene(VIEW, surfaces=[(rectangle((0, 0, 0), (1, 1)), rs.Emissive(pattern=code))])
+    radiance = describe(scene)["surface_0"]["emitter"]["radiance"]
+    assert (radiance["cells"], radiance["amplitude"], radiance["axis"]) == (100, 0.9, 1)
+    with pytest.raises(RendererUnsupported, match="position codes"):
+        write(scene, tmp_path)
 
 
 def test_a_round_mesh_is_a_disk() -> None:
