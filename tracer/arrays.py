@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -160,8 +161,13 @@ def _table(rows: list[list[float]], columns: int) -> Floats:
     return table
 
 
+@lru_cache(maxsize=1)
 def flatten(scene: Scene) -> Arrays:
-    """Raises SceneError for what cannot be traced. `media[0]` is what the camera stands in."""
+    """Raises SceneError for what cannot be traced. `media[0]` is what the camera stands in.
+
+    The last scene's arrays are kept, so that following rays through it in turn grows its trees
+    once. The numpy arrays of a scene must not be changed afterwards.
+    """
     into = _Flattener()
     into.medium(scene.around_camera)
     into.medium(VACUUM)

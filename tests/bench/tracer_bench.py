@@ -1,0 +1,208 @@
+"""How fast the tracer is, as ratios within one run: ``python tests/bench/tracer_bench.py``.
+
+Writes reports/bench.json: for each name its `ratio` and the medians that it is made of. Runs of
+both sides take turns, so that a busy machine slows both. No test looks at these numbers.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import tracer
+from harness.record import write_text
+from harness.renderers.base import RenderSettings
+from harness.renderers.mitsuba import StockEngine
+from harness.renderers.povray import PovRayRenderer
+from harness.scene import resolved
+from harness.scene.load import load_cases
+from harness.scene.resolve import resolve
+from harness.translate.tracer import translate
+from tracer.arrays import flatten
+from tracer.mesh import Mesh
+from tracer.patterns import Constant
+from tracer.scene import Emissive, Scene, Surface
+
+ROOT = Path(__file__).resolve().parents[2]
+SETTINGS = RenderSettings(threads=2)
+ROUNDS = 3
+
+Figures = dict[str, float]
+
+
+def seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def median(rounds: list[float]) -> float:
+    return statistics.median(rounds)
+
+
+def scene_of(file: str, size: int) -> resolved.ResolvedScene:
+    scene = resolve(load_cases(ROOT / "scenes" / file, "normal")[0])
+    return scene.model_copy(update={"film": resolved.Film(width=size, height=size)})
+
+
+def icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=1.0)
+    return np.ascontiguousarray(ball.vertices), np.ascontiguousarray(ball.faces, np.int64)
+
+
+def glass_mesh(size: int) -> resolved.ResolvedScene:
+    """The ball scene with its ball made of 81,920 triangles."""
+    vertices, triangles = icosphere(6)
+    mesh = resolved.Mesh(vertices=vertices.tolist(), triangles=triangles.tolist())
+    scene = scene_of("ball/checkerboard.toml", size)
+    solid = scene.solids[0].model_copy(update={"shape": mesh})
+    return scene.model_copy(update={"solids": (solid,)})
+
+
+def against_povray(scene: resolved.ResolvedScene) -> Figures:
+    """POV-Ray's own trace time over ours, equal image, two threads each."""
+    povray, ours = PovRayRenderer(), translate(scene)
+    width, height = scene.film.width, scene.film.height
+    image = tracer.render(ours, width, height, 2)
+    mine, theirs, difference = [], [], math.inf
+    for _ in range(ROUNDS):
+        mine.append(seconds(lambda: tracer.render(ours, width, height, 2)))
+        other = povray.render(scene, SETTINGS)
+        theirs.append(other.seconds)
+        apart = np.abs(other.pixels - image.pixels).max(axis=2)
+        difference = float(np.percentile(apart, 99.9))
+    return {
+        "ratio": median(theirs) / median(mine),
+        "povray_s": median(theirs),
+        "tracer_s": median(mine),
+        "difference_p999": difference,
+    }
+
+
+def against_mitsuba() -> Figures:
+    """Mitsuba's `path` time to an RMSE of 1e-3, extrapolated by 1 / sqrt(samples), over ours."""
+    scene = scene_of("ball/checkerboard.toml", 256)
+    smooth = resolved.Ramp(start=(0.1, 0.3, 0.9), end=(0.9, 0.6, 0.2), axis="u")
+    face = scene.surfaces[0].model_copy(update={"material": resolved.Emissive(pattern=smooth)})
+    scene = scene.model_copy(update={"surfaces": (face,)})
+    ours, engine = translate(scene), StockEngine()
+    image = tracer.render(ours, 256, 256, 2)
+    mine = median([seconds(lambda: tracer.render(ours, 256, 256, 2)) for _ in range(ROUNDS)])
+    # What it converges to is not our image, for it averages over the pixel: compare its own seeds.
+    points = []
+    for samples in (16, 64, 256):
+        runs = [
+            engine.render(scene, RenderSettings(samples=samples, seed=seed)) for seed in (1, 2, 3)
+        ]
+        noise = float(np.sqrt(np.mean((runs[1].pixels - runs[2].pixels) ** 2) / 2))
+        points.append((median([run.seconds for run in runs[1:]]), noise))
+    wall, noise = points[-1]
+    needed = wall * (noise / 1e-3) ** 2
+    return {
+        "ratio": needed / mine,
+        "mitsuba_s_to_1e-3": needed,
+        "tracer_s": mine,
+        "rmse_16": points[0][1],
+        "rmse_64": points[1][1],
+        "rmse_256": noise,
+        "mean": float(image.pixels.mean()),
+    }
+
+
+def against_embree() -> Figures:
+    """Closest hits per second of random rays on 1.3 million triangles, over Mitsuba's Embree."""
+    import drjit
+    import mitsuba
+
+    engine = StockEngine()
+    engine.version()
+    vertices, triangles = icosphere(8)
+    rng = np.random.default_rng(1)
+    origins = rng.uniform(-1.5, 1.5, (1_000_000, 3))
+    directions = rng.normal(size=origins.shape)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+
+    lamp = Surface(Mesh(vertices, triangles), Emissive(Constant((1.0, 1.0, 1.0))))
+    camera = translate(scene_of("ball/checkerboard.toml", 8)).camera
+    scene = Scene(camera, surfaces=(lamp,))
+    build = seconds(lambda: flatten(scene))
+    arrays = flatten(scene)
+    stored = sum(a.nbytes for a in (arrays.nodes, arrays.triangles, arrays.normals))
+
+    mitsuba.set_variant("llvm_ad_rgb")
+    mesh = mitsuba.Mesh("ball", len(vertices), len(triangles))
+    parameters = mitsuba.traverse(mesh)
+    parameters["vertex_positions"] = vertices.ravel().astype(np.float32)
+    parameters["faces"] = triangles.ravel().astype(np.uint32)
+    parameters.update()
+    world = mitsuba.load_dict({"type": "scene", "ball": mesh})
+    single = origins.T.astype(np.float32), directions.T.astype(np.float32)
+    rays = mitsuba.Ray3f(mitsuba.Point3f(single[0]), mitsuba.Vector3f(single[1]))
+    drjit.eval(rays)
+
+    def embree() -> None:
+        hit = world.ray_intersect_preliminary(rays, coherent=False)
+        drjit.eval(hit.t)
+        drjit.sync_thread()
+
+    def ours() -> None:
+        tracer.follow(scene, origins, directions, "", threads=2)
+
+    embree(), ours()
+    theirs, mine = [], []
+    for _ in range(2 * ROUNDS):
+        theirs.append(seconds(embree))
+        mine.append(seconds(ours))
+    return {
+        "ratio": median(theirs) / median(mine),
+        "embree_mrays_s": len(origins) / median(theirs) / 1e6,
+        "tracer_mrays_s": len(origins) / median(mine) / 1e6,
+        "build_s": build,
+        "bytes_per_triangle": stored / len(triangles),
+    }
+
+
+def threads() -> Figures:
+    scene = translate(scene_of("package/complete.toml", 1024))
+    tracer.render(scene, 8, 8)
+    one = [seconds(lambda: tracer.render(scene, 1024, 1024, 1)) for _ in range(ROUNDS)]
+    two = [seconds(lambda: tracer.render(scene, 1024, 1024, 2)) for _ in range(ROUNDS)]
+    return {"ratio": median(one) / median(two), "one_s": median(one), "two_s": median(two)}
+
+
+BENCHES: dict[str, Callable[[], Figures]] = {
+    "tracer_vs_povray_wall_ball": lambda: against_povray(scene_of("ball/checkerboard.toml", 1024)),
+    "tracer_vs_povray_wall_package": lambda: against_povray(
+        scene_of("package/complete.toml", 1024)
+    ),
+    "tracer_vs_povray_wall_mesh": lambda: against_povray(glass_mesh(1024)),
+    "tracer_vs_mitsuba_equal_error": against_mitsuba,
+    "mesh_rays_vs_embree": against_embree,
+    "threads_speedup": threads,
+}
+
+
+def main(names: list[str]) -> None:
+    figures = {}
+    for name in names or list(BENCHES):
+        figures[name] = BENCHES[name]()
+        shown = "  ".join(f"{key} {value:.4g}" for key, value in figures[name].items())
+        sys.stdout.write(f"{name:32s} {shown}\n")
+        sys.stdout.flush()
+    file = ROOT / "reports" / "bench.json"
+    machine = {"processor": platform.processor() or platform.machine()}
+    write_text(file, json.dumps({"machine": machine, "figures": figures}, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
