@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ from tracer.arrays import (
     MATERIAL,
     MEDIUM,
     MIRROR,
+    NORMALS,
     THIN_SLAB,
     TRANSLUCENT,
     Arrays,
@@ -24,7 +25,7 @@ from tracer.errors import SceneError
 from tracer.hit import NOTHING, hit_point, nearest_hit, new_stack
 from tracer.optics import reflect
 from tracer.scene import Scene
-from tracer.surface import interface, thin_slab
+from tracer.surface import interface, thin_slab, upright
 from tracer.threads import for_bands
 from tracer.vector import Vec, scale
 
@@ -40,14 +41,14 @@ GOING = -1
 TRANSMIT = ord("T")
 
 
-@dataclass(frozen=True, eq=False)
-class Paths:
+class Paths(NamedTuple):
     """What became of n rays.
 
     `status` (n,) int8; `surface` (n,) index into scene.surfaces or -1; `point` (n, 3) where the
     ray landed, NaN unless it did; `direction` (n, 3) of its last leg; `weight` (n,) product of the
     Fresnel factors R and 1 - R; `optical_length` (n,) sum of ior times length up to the last
-    point; `vertices` (n, len(path) + 2, 3) from the origin on, NaN-padded.
+    point; `vertices` (n, len(path) + 2, 3) from the origin on, NaN-padded, and empty unless they
+    are asked for.
     """
 
     status: NDArray[np.int8]
@@ -56,7 +57,7 @@ class Paths:
     direction: Floats
     weight: Floats
     optical_length: Floats
-    vertices: Floats | None = None
+    vertices: Floats
 
 
 @inlined
@@ -87,7 +88,9 @@ def _take(
     if material == DIELECTRIC:
         here, beyond = (outside, inside) if entering else (inside, outside)
         ior_i, ior_t = scene.media[here, 0], scene.media[beyond, 0]
-        transmits, R, wr, wt = interface(wi, n, geometric, ior_i, ior_t)
+        if scene.objects[hit, NORMALS] >= 0:
+            n = upright(wi, n, geometric, ior_i, ior_t)
+        transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
         if not transmit:
             return GOING, p, wr, R, 0.0
         return (GOING, p, wt, 1.0 - R, 0.0) if transmits else (TIR, p, wr, 1.0, 0.0)
@@ -172,25 +175,19 @@ def _follow(
     max_depth: int,
     begin: int,
     end: int,
-    status: NDArray[np.int8],
-    surface: NDArray[np.int32],
-    point: Floats,
-    direction: Floats,
-    weight: Floats,
-    optical: Floats,
-    vertices: NDArray[np.float64],
+    found: Paths,
     stack: Floats,
 ) -> None:
     for i in range(begin, end):
         o = (origins[i, 0], origins[i, 1], origins[i, 2])
         d = (directions[i, 0], directions[i, 1], directions[i, 2])
-        way = vertices[i] if len(vertices) else vertices[0:0, 0]
-        s, hit, p, d, w, length = _follow_one(scene, o, d, letters, max_depth, way, stack)
-        status[i], weight[i], optical[i] = s, w, length
-        surface[i] = hit - solids if s == HIT else -1
-        _put(direction, i, d)
-        if s == HIT:
-            _put(point, i, p)
+        way = found.vertices[i] if len(found.vertices) else found.vertices[0:0, 0]
+        status, hit, p, d, weight, length = _follow_one(scene, o, d, letters, max_depth, way, stack)
+        found.status[i], found.weight[i], found.optical_length[i] = status, weight, length
+        found.surface[i] = hit - solids if status == HIT else -1
+        _put(found.direction, i, d)
+        if status == HIT:
+            _put(found.point, i, p)
 
 
 def follow(
@@ -221,31 +218,15 @@ def follow(
         direction=np.empty((n, 3)),
         weight=np.empty(n),
         optical_length=np.empty(n),
-        vertices=np.full((n, len(path) + 2, 3), np.nan) if vertices else None,
+        vertices=np.full((n if vertices else 0, len(path) + 2, 3), np.nan),
     )
     arrays = flatten(scene)
     letters = np.frombuffer(path.encode(), np.uint8).copy()
-    ways = found.vertices if found.vertices is not None else np.empty((0, 0, 3))
+
+    solids, max_depth = len(scene.solids), scene.transport.max_depth
 
     def some(begin: int, end: int) -> None:
-        _follow(
-            arrays,
-            len(scene.solids),
-            o,
-            d,
-            letters,
-            scene.transport.max_depth,
-            begin,
-            end,
-            found.status,
-            found.surface,
-            found.point,
-            found.direction,
-            found.weight,
-            found.optical_length,
-            ways,
-            new_stack(),
-        )
+        _follow(arrays, solids, o, d, letters, max_depth, begin, end, found, new_stack())
 
     for_bands(some, n, BAND, threads)
     return found

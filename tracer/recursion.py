@@ -24,6 +24,7 @@ from tracer.surface import BLACK, Lobes, scatter
 from tracer.threads import for_bands
 from tracer.vector import Vec, add, mul
 
+TELLING = 1e-4  # a weight whose loss would show in a picture
 BAND = 4  # rows of pixels that a thread takes at a time
 
 
@@ -31,11 +32,14 @@ BAND = 4  # rows of pixels that a thread takes at a time
 class Render:
     """`pixels` (H, W, 3) radiance, row 0 at the top; `cut` (H, W), the weight not followed.
 
-    In a world of radiance 1 without absorption, pixels + cut is 1.
+    In a world of radiance 1 without absorption, pixels + cut is 1. `closest` (H, W) is the shortest
+    way between two surfaces on any ray that carries at least `TELLING`, infinite where there is
+    none: a ray through a corner of glass, which a renderer that cannot resolve it loses.
     """
 
     pixels: Floats
     cut: Floats
+    closest: Floats
 
 
 class Limits(NamedTuple):
@@ -93,9 +97,9 @@ def _worth(ray: Ray, limits: Limits) -> tuple[bool, float]:
 @inlined
 def radiance(
     scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
-) -> tuple[Vec, float]:
-    """(radiance that arrives at `o` against the direction `d`, weight cut); starts in medium 0."""
-    seen, cut, height = BLACK, 0.0, 0
+) -> tuple[Vec, float, float]:
+    """(radiance that arrives at `o` against `d`, weight cut, closest); starts in medium 0."""
+    seen, cut, closest, height = BLACK, 0.0, np.inf, 0
     ray = Ray(o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
     while True:
         hit, face, t, entering = nearest_hit(
@@ -105,6 +109,8 @@ def radiance(
         if hit == NOTHING:
             seen = add(seen, mul(weight, vec_at(scene.background, 0, 0)))
         else:
+            if ray.segments > 1 and t < closest and max(weight[0], weight[1], weight[2]) >= TELLING:
+                closest = t
             at = scatter(scene, lobes, ray.o, t, ray.d, ray.medium, hit, face, entering, stack)
             seen = add(seen, mul(weight, at.sent))
             reflected = Ray(
@@ -140,7 +146,7 @@ def radiance(
                 ray = reflected
                 continue
         if height == 0:
-            return seen, cut
+            return seen, cut, closest
         height -= 1
         ray = _take_up(waiting, height)
 
@@ -157,16 +163,18 @@ def _render_rows(
     stack: Floats,
     pixels: Floats,
     cut: Floats,
+    closest: Floats,
 ) -> None:
     height, width = cut.shape
     for j in range(begin, end):
         for i in range(width):
             x, y = pixel_centre(i, j, width, height)
             o, d = primary_ray(camera, x, y)
-            seen, lost = radiance(scene, limits, lobes, o, d, waiting, stack)
+            seen, lost, near = radiance(scene, limits, lobes, o, d, waiting, stack)
             for k in range(3):
                 pixels[j, i, k] = seen[k]
             cut[j, i] = lost
+            closest[j, i] = near
 
 
 def render(scene: Scene, width: int, height: int, threads: int | None = None) -> Render:
@@ -179,13 +187,24 @@ def render(scene: Scene, width: int, height: int, threads: int | None = None) ->
     limits = Limits(transport.max_depth, transport.min_weight)
     lobes = Lobes(transport.reflection, transport.transmission, transport.radiance_n2)
     camera = camera_row(scene.camera, width, height)
-    image = Render(np.empty((height, width, 3)), np.empty((height, width)))
+    film = (height, width)
+    image = Render(np.empty((*film, 3)), np.empty(film), np.empty(film))
 
     def rows(begin: int, end: int) -> None:
         depth = transport.max_depth + 1
         waiting = Waiting(np.empty((depth, 9)), np.empty((depth, 5), np.int64))
         _render_rows(
-            arrays, limits, lobes, camera, begin, end, waiting, new_stack(), image.pixels, image.cut
+            arrays,
+            limits,
+            lobes,
+            camera,
+            begin,
+            end,
+            waiting,
+            new_stack(),
+            image.pixels,
+            image.cut,
+            image.closest,
         )
 
     for_bands(rows, height, BAND, threads)

@@ -13,6 +13,7 @@ from tracer.arrays import (
     MATERIAL,
     MEDIUM,
     MIRROR,
+    NORMALS,
     PATTERN,
     RECTANGLE,
     SHAPE,
@@ -67,7 +68,8 @@ class Scattered(NamedTuple):
 
 
 @inlined
-def _interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float, Vec, Vec]:
+def interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float, Vec, Vec]:
+    """(transmits, R, wr, wt) where two media meet; R is 1 in total internal reflection."""
     cos_theta_i = max(0.0, dot(wi, n))
     transmits, cos_theta_t = cos_transmitted(cos_theta_i, ior_i, ior_t)
     wr = reflect(wi, n)
@@ -77,19 +79,15 @@ def _interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float
     return True, R, wr, transmitted(wi, n, cos_theta_i, cos_theta_t, ior_i / ior_t)
 
 
-@inlined
-def interface(
-    wi: Vec, shading: Vec, geometric: Vec, ior_i: float, ior_t: float
-) -> tuple[bool, float, Vec, Vec]:
-    """(transmits, R, wr, wt) where two media meet; R is 1 in total internal reflection.
-
-    Where the smooth normal of a mesh would send a ray to the wrong side of its triangle, the
-    triangle's own normal is used.
+@called
+def upright(wi: Vec, smooth: Vec, geometric: Vec, ior_i: float, ior_t: float) -> Vec:
+    """The normal to refract at: a mesh's smooth one, but where that would send a ray to the wrong
+    side of its triangle, the triangle's own.
     """
-    transmits, R, wr, wt = _interface(wi, shading, ior_i, ior_t)
+    transmits, _, wr, wt = interface(wi, smooth, ior_i, ior_t)
     if dot(wr, geometric) < 0.0 or (transmits and dot(wt, geometric) > 0.0):
-        transmits, R, wr, wt = _interface(wi, geometric, ior_i, ior_t)
-    return transmits, R, wr, wt
+        return geometric
+    return smooth
 
 
 @called
@@ -105,7 +103,7 @@ def thin_slab(
     thickness = scene.materials[hit, 6]
     ior_i = scene.media[scene.objects[hit, EXTERIOR], 0]
     ior_t = scene.media[scene.objects[hit, MEDIUM], 0]
-    transmits, R, wr, wt = interface(wi, n, n, ior_i, ior_t)
+    transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
     cos_theta_i, cos_theta_t = dot(wi, n), -dot(wt, n)
     if not (transmits and cos_theta_t > 0.0 and cos_theta_i > 0.0):
         return False, 1.0, wr, p, 0.0, 0.0
@@ -148,7 +146,9 @@ def scatter(
         inside, outside = objects[hit, MEDIUM], objects[hit, EXTERIOR]
         medium, beyond = (outside, inside) if entering else (inside, outside)
         ior_i, ior_t = scene.media[medium, 0], scene.media[beyond, 0]
-        transmits, R, wr, wt = interface(wi, n, geometric, ior_i, ior_t)
+        if objects[hit, NORMALS] >= 0:
+            n = upright(wi, n, geometric, ior_i, ior_t)
+        transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
         if lobes.reflection or not transmits:
             reflected = (R, R, R)
         if lobes.transmission and transmits:

@@ -18,6 +18,9 @@ from harness.scene.resolved import ResolvedScene
 CAPABILITIES = frozenset(Capability) - {Capability.RADIANCE_N2}
 
 
+FAR = 1e30  # instead of infinity, which no image file should hold
+
+
 class TracerEngine:
     """Deterministic: the same bits for any number of threads."""
 
@@ -40,6 +43,7 @@ class TracerEngine:
         cut = float(image.cut.mean())
         return Image(
             pixels=image.pixels.astype(np.float32),
+            closest=np.minimum(image.closest, FAR).astype(np.float32),
             seconds=time.perf_counter() - start,
             log=f"mean weight cut by max_depth and min_weight: {cut:.3g}",
         )
@@ -47,7 +51,7 @@ class TracerEngine:
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
     ) -> RayPaths:
-        """Follows rays along `path`, with all vertices."""
+        """Follows rays along `path`; nobody asks a worker for vertices."""
         from harness.translate.tracer import translate
 
         try:
@@ -56,7 +60,6 @@ class TracerEngine:
                 rays.origins,
                 rays.directions,
                 path,
-                vertices=True,
                 threads=settings.threads,
             )
         except tracer.SceneError as error:
@@ -68,7 +71,6 @@ class TracerEngine:
             direction=found.direction,
             weight=found.weight,
             optical_length=found.optical_length,
-            vertices=found.vertices,
         )
 
     def emit(self, scene: ResolvedScene, folder: Path) -> Path:

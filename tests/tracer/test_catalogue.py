@@ -297,7 +297,6 @@ def traced_focus(h: float, radius: float, ior: float) -> float:
     """How far behind the centre a ray at height `h` crosses the axis."""
     scene = glass(Sphere((0.0, 0.0, 0.0), radius), ior, ends_at=-3 * radius)
     found = one(scene, (h, 0.0, 2 * radius), (0.0, 0.0, -1.0), "TT")
-    assert found.vertices is not None
     return -axis_crossing(found.vertices[0, 2], found.direction[0])
 
 
@@ -388,13 +387,13 @@ def test_stigmatic_surfaces(row: Row) -> None:
                 (0.0, 0.0, 0.0), down_axis, (radius, math.inf), 40.0, 7.0, (-1 / ior**2, 0.0)
             )
             found = one(glass(solid, ior), (h, 0.0, 5.0), down_axis, "T")
-            vertex, start = 0.0, found.vertices[0, 1]  # type: ignore[index]
+            vertex, start = 0.0, found.vertices[0, 1]
         else:
             solid = lens(
                 (0.0, 0.0, 0.0), down_axis, (math.inf, -radius), 8.0, 7.0, (0.0, -(ior**2))
             )
             found = one(glass(solid, ior), (h, 0.0, 5.0), down_axis, "TT")
-            vertex, start = -8.0, found.vertices[0, 2]  # type: ignore[index]
+            vertex, start = -8.0, found.vertices[0, 2]
         crossing = axis_crossing(start, found.direction[0])
         # A direction's rounding, eps, acts over the lever focus / h on the crossing.
         allowed = 8 * EPS * focus * focus / h
@@ -409,7 +408,6 @@ def test_aplanatic_points(row: Row) -> None:
     scene = replace(glass(Sphere((0.0, 0.0, 0.0), radius), ior), around_camera=Medium(ior))
     for theta in (1.0, 20.0, 60.0, 85.0):
         found = one(scene, (0.0, 0.0, -inner), (sind(theta), 0.0, cosd(theta)), "T")
-        assert found.vertices is not None
         crossing = axis_crossing(found.vertices[0, 1], found.direction[0])
         slope = abs(float(found.direction[0, 0]))
         assert crossing == pytest.approx(-virtual, abs=16 * EPS * virtual / slope)
@@ -436,7 +434,6 @@ def test_corner_cube_sends_light_back(ior: float) -> None:
     d = normalise((-1.0, -1.05, -0.93))
     found = one(glass(corner_of_glass(), ior), (0.55, 0.6, 0.5), d, "TRRRT")
     assert found.status[0] != TIR
-    assert found.vertices is not None
     assert np.isfinite(found.vertices[0, 5]).all()  # all five interfaces were met
     # Two refractions and three reflections, each within 8 eps.
     assert np.abs(found.direction[0] + np.array(d)).max() <= 5 * 8 * EPS
@@ -480,7 +477,6 @@ def test_apparent_depth(row: Row) -> None:
         a = inside + tilt
         found = one(scene, (0.0, 0.0, -depth), (math.sin(a), 0.0, math.cos(a)), "T")
         d = found.direction[0]
-        assert found.vertices is not None
         return float(found.vertices[0, 1, 0]), math.atan2(d[0], d[2])
 
     (x0, a0), (x1, a1) = leaving(-h), leaving(h)

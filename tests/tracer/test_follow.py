@@ -101,7 +101,6 @@ def test_ball_bends_as_the_closed_form() -> None:
     expected = np.stack([-np.sin(turn), np.zeros_like(h), -np.cos(turn)], axis=1)
     condition = 1 / np.sqrt(1 - h**2)
     assert (angles(found.direction, expected) <= 1e-14 * condition).all()
-    assert found.vertices is not None
     assert found.vertices.shape == (200, 4, 3)
     on_ball = np.linalg.norm(found.vertices[:, 1:3], axis=2)
     assert np.abs(on_ball - 1).max() <= 1e-15 * 3

@@ -48,7 +48,6 @@ def test_rays_can_be_run_backwards(seed: int, shape: str, ior: float, path: str)
     origins, directions = rays_at(np.random.default_rng(seed), 200)
     scene = glass(SHAPES[shape], ior)
     there = follow(scene, origins, directions, path, vertices=True)
-    assert there.vertices is not None
     out = np.isfinite(there.vertices[:, len(path)]).all(axis=1) & (there.status == MISS)
     out &= np.isnan(there.vertices[:, len(path) + 1]).all(axis=1)
     last = there.vertices[out, len(path)]
@@ -56,7 +55,6 @@ def test_rays_can_be_run_backwards(seed: int, shape: str, ior: float, path: str)
     fair = there.weight[out] > (1e-2 if path == "TT" else 1e-5)
     start = last[fair] + there.direction[out][fair]
     back = follow(scene, start, -there.direction[out][fair], path[::-1], vertices=True)
-    assert back.vertices is not None
     same = np.abs(back.vertices[:, 1] - last[fair]).max(axis=1, initial=0) <= 1e-9
     again = angles(back.direction, -directions[out][fair])
     assert (again[same] <= 1e-9).all()
@@ -173,7 +171,7 @@ def test_energy_is_kept_at_every_interface(seed: int, ior: float) -> None:
     """R + T = 1 along both ways that a ray can take, so the weights of all paths sum to 1."""
     origins, directions = rays_at(np.random.default_rng(seed), 100)
     scene = glass(cube(), ior)
-    met = ~np.isnan(follow(scene, origins, directions, "R", vertices=True).vertices[:, 1, 0])  # type: ignore[index]
+    met = ~np.isnan(follow(scene, origins, directions, "R", vertices=True).vertices[:, 1, 0])
     reflected = follow(scene, origins, directions, "R").weight[met]
     passed = follow(scene, origins, directions, "T").weight[met]
     assert np.abs(reflected + passed - 1).max(initial=0.0) <= 4 * EPS
