@@ -41,6 +41,9 @@ class Done:
 
 
 Event = Calibrated | Done
+# What a renderer of someone else's may raise. Each must end as an event, or the run would wait for
+# it for ever; SystemExit is no Exception.
+ANYTHING = (Exception, SystemExit)
 MakeExecutor = Callable[[int], Executor]
 
 
@@ -79,13 +82,14 @@ class Lane:
             close()
 
     def _calibrate(self) -> None:
+        remedy = ""
         try:
-            contender, remedy = calibrate(self.renderer, self.settings), ""
-        except Exception as error:  # a renderer of someone else's may raise anything
-            reason = f"failed: {type(error).__name__}: {error}"
+            contender = calibrate(self.renderer, self.settings)
+            if contender.absent is Verdict.SKIP:
+                remedy = self.renderer.health().remedy
+        except ANYTHING as error:
+            reason = f"failed: {_described(error)}"
             contender = _out(self.renderer.name, Verdict.ERROR, reason)
-        if contender.absent is Verdict.SKIP:
-            remedy = self.renderer.health().remedy
         self.events.put(Calibrated(contender, remedy))
 
     def _perform(self, case: int, job: Job) -> None:
@@ -106,8 +110,8 @@ def perform(renderer: Renderer, job: Job) -> Result:
         return renderer.trace(job.scene, primary_rays(job.scene), job.path, job.settings)
     except RendererError as error:
         return error
-    except Exception as error:
-        return RendererFailed(f"{type(error).__name__}: {error}")
+    except ANYTHING as error:
+        return RendererFailed(_described(error))
 
 
 def calibrate(renderer: Renderer, settings: RenderSettings) -> Contender:
@@ -133,6 +137,10 @@ def calibrate(renderer: Renderer, settings: RenderSettings) -> Contender:
 
 def _out(name: str, absent: Verdict, reason: str, version: str = "") -> Contender:
     return Contender(name, version, frozenset(), None, absent, reason)
+
+
+def _described(error: BaseException) -> str:
+    return f"{type(error).__name__}: {error}".rstrip(": ")
 
 
 def _tail(error: RendererError) -> str:
