@@ -254,22 +254,30 @@ def corner(table: Floats, triangle: int, k: int) -> Vec:
 
 
 @inlined
-def triangle_distance(o: Vec, d: Vec, triangles: Floats, triangle: int) -> tuple[float, int]:
+def triangle_distance(
+    o: Vec, d: Vec, triangles: Floats, triangle: int, side: int, t_min: float, t_max: float
+) -> tuple[float, int]:
     """(distance, side): side +1 where the ray comes from outside, -1 from inside, 0 if missed.
 
-    Watertight: the three edge functions are triple products that change nothing but their sign
-    when an edge is taken the other way round, so no ray slips between two neighbours.
+    Only hits from `side` count, unless it is 0, and only those between `t_min` and `t_max`; most
+    triangles fail one of these before anything is divided. Watertight: the three edge functions
+    are triple products that change nothing but their sign when an edge is taken the other way
+    round, so no ray slips between two neighbours.
     """
     a = sub(corner(triangles, triangle, 0), o)
     b = sub(corner(triangles, triangle, 1), o)
     c = sub(corner(triangles, triangle, 2), o)
-    u, v, w = dot(d, cross(c, b)), dot(d, cross(a, c)), dot(d, cross(b, a))
-    outside = u >= 0.0 and v >= 0.0 and w >= 0.0
-    inside = u <= 0.0 and v <= 0.0 and w <= 0.0
-    if outside == inside:  # missed, or seen edge-on
-        return np.inf, 0
     n = cross(sub(b, a), sub(c, a))
-    return dot(n, a) / dot(n, d), 1 if outside else -1
+    height, approach = dot(n, a), dot(n, d)
+    from_side = -1
+    if approach < 0.0:
+        height, approach, from_side = -height, -approach, 1
+    if side == -from_side or not t_min * approach < height < t_max * approach:
+        return INF, 0
+    u, v, w = dot(d, cross(c, b)), dot(d, cross(a, c)), dot(d, cross(b, a))
+    if min(u, v, w) < 0.0 < max(u, v, w):
+        return INF, 0
+    return max(0.0, height / approach), from_side
 
 
 @inlined
@@ -311,7 +319,11 @@ def mesh_hit(
     triangles, and only from `side`. Those may begin where it stands, within rounding.
     """
     best, hit, hit_side = t_max, -1, 0
-    t_min = 0.0 if on_face < 0 else -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
+    t_min = 0.0
+    if on_face < 0:
+        side = 0
+    else:
+        t_min = -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
     inverse = (1.0 / d[0], 1.0 / d[1], 1.0 / d[2])
     near = (0 if d[0] >= 0.0 else 3, 1 if d[1] >= 0.0 else 4, 2 if d[2] >= 0.0 else 5)
     far = (3 - near[0], 5 - near[1], 7 - near[2])
@@ -329,13 +341,10 @@ def mesh_hit(
             node = first if t0 < INF else EMPTY_LEAF
         leaf = -1 - node
         for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
-            if triangle == on_face:
-                continue
-            t, from_side = triangle_distance(o, d, triangles, triangle)
-            if from_side == 0 or (on_face >= 0 and from_side != side):
-                continue
-            if t < best and (t > 0.0 or (on_face >= 0 and t >= t_min)):
-                best, hit, hit_side = max(t, 0.0), triangle, from_side
+            if triangle != on_face:
+                t, from_side = triangle_distance(o, d, triangles, triangle, side, t_min, best)
+                if from_side != 0:
+                    best, hit, hit_side = t, triangle, from_side
         while height > 0 and stack[height - 1, 0] > best:
             height -= 1
         if height == 0:
