@@ -16,7 +16,7 @@ from harness.judge import CaseJudge
 from harness.lanes import Calibrated, Done, Event, Lane
 from harness.pairs import camera_shift
 from harness.plan import Job, PreparedCase
-from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdict, worst
+from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdict
 from harness.renderers.base import Renderer, RenderSettings
 from harness.results import Contender, Result, Results
 
@@ -64,6 +64,10 @@ def run(
         raise InputError.of("no case to run")
     if not renderers:
         raise InputError.of("no renderer to run")
+    names = [renderer.name for renderer in renderers]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError.of("two renderers of one name", key="--renderer", value=name)
     settings = RenderSettings(samples=SAMPLES[quality], seed=seed, threads=threads)
     session = _Session(cases, renderers, helper, Archive(out), settings, quality, report)
     try:
@@ -189,7 +193,7 @@ class _Session:
             wall_s=time.perf_counter() - self.began,
             quality=self.quality,
             command=command,
-            exit_code=exit_code(verdicts, [self.contenders[name] for name in self.names]),
+            exit_code=exit_code(cases, [self.contenders[name] for name in self.names]),
             renderers={name: self._renderer_summary(name) for name in self.names},
             counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
             cases=cases,
@@ -213,13 +217,19 @@ class _Session:
         )
 
 
-def exit_code(verdicts: list[Verdict], contenders: list[Contender]) -> int:
-    """0 all passed, 1 a check failed or there was none, 3 something asked for could not run."""
+def exit_code(cases: list[SummaryCase], contenders: list[Contender]) -> int:
+    """0 all passed, 1 a check failed or there was none, 3 something asked for could not run.
+
+    A case without checks is an ERROR, and where everything is skipped nothing has run.
+    """
+    verdicts = [check.status for case in cases for check in case.checks]
     if Verdict.FAIL in verdicts or not verdicts:
         return 1
-    if Verdict.ERROR in verdicts or any(c.absent is not None for c in contenders):
+    if any(case.status is Verdict.ERROR for case in cases):
         return 3
-    return 0 if worst(verdicts) in (Verdict.PASS, Verdict.KNOWN, Verdict.SKIP) else 1
+    if any(contender.absent is not None for contender in contenders):
+        return 3
+    return 0 if {Verdict.PASS, Verdict.KNOWN} & set(verdicts) else 3
 
 
 def now() -> str:
