@@ -112,6 +112,8 @@ def _boundary(
     is put through the same threshold. A renderer that samples `over_area` lights a pixel of which
     any part is lit, half a pixel further out.
     """
+    if not np.isfinite(pixels).all():
+        raise Unmeasurable("a measured pixel is not finite")
     light = pixels.reshape(-1, 3).min(axis=1).astype(np.float64)
     threshold = lit_threshold(quantum)
     known = np.isin(truth.paths.status, (Status.HIT, Status.TIR))
