@@ -1,0 +1,37 @@
+"""Runs of the tiny scenes in tests/data/scenes: a few dozen rays each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from harness.plan import PreparedCase, prepare
+from harness.record import Check, Summary
+from harness.renderers.base import Renderer
+from harness.run import run
+from harness.scene.load import find
+from tests.fakes.student import student
+
+SCENES = Path(__file__).parents[1] / "data" / "scenes"
+
+
+def prepared(*selection: str, root: Path = SCENES) -> list[PreparedCase]:
+    """The selected tiny cases, all of them by default."""
+    return [prepare(case) for case in find(selection, root)]
+
+
+def run_tiny(
+    out: Path, *renderers: Renderer, cases: Sequence[str] = (), helper: Renderer | None = None
+) -> Summary:
+    """A run of the selected tiny cases, with the student as helper."""
+    return run(prepared(*cases), list(renderers), helper or student(name="helper"), out)
+
+
+def checks_of(summary: Summary, renderer: str | None = None) -> list[Check]:
+    """All checks, or those of one renderer."""
+    return [
+        check
+        for case in summary.cases
+        for check in case.checks
+        if renderer is None or check.renderer == renderer
+    ]
