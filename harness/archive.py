@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import numpy as np
 from harness import __version__, plan, record
 from harness.errors import RendererError, RendererFailed
 from harness.judge import Judgement
+from harness.measure.images import Pixels
 from harness.plan import PreparedCase
 from harness.record import CaseRecord, DifferenceMap, ImageFile, RendererRun, Table, Verdict, worst
 from harness.renderers.base import Image, RenderSettings
@@ -122,15 +123,12 @@ class Archive:
         from harness.report.pictures import write_picture, write_thumbnail
 
         files = []
-        for role in (plan.IMAGE, plan.VIEW):
-            image = mine.get(role)
-            if not isinstance(image, Image):
-                continue
+        for role, shown in _shown(mine):
             stem = f"images/{name}/{renderer}-{role}"
-            imagefile.write_exr(self.root / f"{stem}.exr", image.pixels)
-            write_picture(image.pixels, self.root / f"{stem}.webp")
-            write_thumbnail(image.pixels, self.root / f"{stem}-small.webp")
-            pixels = np.ascontiguousarray(image.pixels, np.dtype("<f4"))
+            imagefile.write_exr(self.root / f"{stem}.exr", shown)
+            write_picture(shown, self.root / f"{stem}.webp")
+            write_thumbnail(shown, self.root / f"{stem}-small.webp")
+            pixels = np.ascontiguousarray(shown, np.dtype("<f4"))
             height, width = pixels.shape[:2]
             files.append(
                 ImageFile(
@@ -163,6 +161,20 @@ class Archive:
             write_difference(pictures[a], pictures[b], DIFFERENCE_LIMIT, self.root / path)
             maps.append(DifferenceMap(a=a, b=b, path=path, limit=DIFFERENCE_LIMIT, unit="radiance"))
         return maps
+
+
+def _shown(mine: Mapping[str, object]) -> Iterator[tuple[str, Pixels]]:
+    """The pictures worth keeping, by role: a scene's own, or how its first probe looks."""
+    for role in (plan.IMAGE, plan.VIEW):
+        image = mine.get(role)
+        if isinstance(image, Image):
+            yield role, image.pixels
+            return
+    coded = [image for role, image in mine.items() if "plane 0 u" in role]
+    lit = [image for role, image in mine.items() if role.endswith(": light")]
+    for image in (*coded, *lit)[:1]:
+        if isinstance(image, Image):
+            yield plan.VIEW, plan.coarse_view(image.pixels) if coded else image.pixels
 
 
 def scene_text(case: PreparedCase) -> str:

@@ -145,7 +145,15 @@ class CaseJudge:
         cells = min(preflight.cells, probe.cells)
         alone = Capability.LOBE_SWITCH in contender.capabilities
         mixed = np.zeros(len(truth.grazing), bool) if alone else truth.ambiguous
-        return from_images(images, truth, cells, preflight.code_quantum, mixed, preflight.samples)
+        return from_images(
+            images,
+            truth,
+            cells,
+            preflight.code_quantum,
+            preflight.epsilon,
+            mixed,
+            preflight.samples,
+        )
 
 
 def _merge(curves: list[Curve], spec: model.CheckSpec, curve: Curve, renderer: str) -> None:

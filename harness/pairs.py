@@ -7,6 +7,7 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness import plan
 from harness.errors import SnellcheckError
@@ -21,12 +22,18 @@ from harness.measure.pictures import (
     geometric_error,
     sensitivity,
 )
+from harness.measure.probe_truth import ROUNDINGS
 from harness.preflight import FLOAT32
 from harness.record import Check, Verdict
+from harness.renderers.base import Capability, Image
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolved import ResolvedScene
 from harness.verdict import judge, unmeasured
+
+# float32 renderers start a ray this far from the surface that it leaves, lest they hit it again
+# (Mitsuba 8.9e-5, and we 1e-4 for it): of a ray through a corner of glass they lose shorter ways.
+STEP_OFF = 2e-4
 
 
 def camera_shift(scene: ResolvedScene) -> float:
@@ -94,13 +101,33 @@ class PairJudge:
         key = (a.name, b.name)
         if key not in self._made:
             change = self._sensitivity
-            cut = 2 * self._scene.transport.min_weight * self._scene.transport.max_depth
-            floor = a.ready().quantum + b.ready().quantum + cut
+            transport = self._scene.transport
+            # Rays whose weight is the least to be followed may be followed by one and not the
+            # other, once a generation; and each generation rounds the weight.
+            cut = 2 * transport.min_weight * transport.max_depth
+            epsilon = max(a.ready().epsilon, b.ready().epsilon)
+            rounding = ROUNDINGS * epsilon / 2 * transport.max_depth
+            floor = a.ready().quantum + b.ready().quantum + cut + rounding
+            grazing = change > GRAZING
+            if not all(Capability.DOUBLE in c.capabilities for c in (a, b)):
+                grazing = grazing | (self._closest < STEP_OFF)
             self._made[key] = PicturePair(
-                self._results.picture(a, plan.IMAGE), self._results.picture(b, plan.IMAGE),
-                floor + change, change > GRAZING,
-            )  # fmt: skip
+                self._results.picture(a, plan.IMAGE),
+                self._results.picture(b, plan.IMAGE),
+                floor + change,
+                grazing,
+            )
         return self._made[key]
+
+    @cached_property
+    def _closest(self) -> NDArray[np.float32]:
+        """(H, W) the shortest way between surfaces that the pixel's rays go."""
+        image = self._results.of(self._helper, plan.BASE_IMAGE)
+        if not isinstance(image, Image) or image.closest is None:
+            raise NotAvailable(
+                Verdict.ERROR, f"{self._helper} does not tell how close surfaces are"
+            )
+        return image.closest
 
     @cached_property
     def _base(self) -> Pixels:

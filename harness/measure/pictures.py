@@ -119,8 +119,8 @@ class PicturePair:
         return Comparison(
             float(self.difference[y, x]), 0.0, float(self.tolerance[y, x]),
             bool(ratio[y, x] <= 1),
-            "quanta of both pictures + light cut by weight + change of the pixel when the camera "
-            "moves by the renderers' geometric error",
+            "quanta of both pictures + light cut by weight + roundings of weights + change of the "
+            "pixel when the camera moves by the renderers' geometric error",
             crowded,
             self._counts()
             | {"max": float(self.difference[keep].max()), "worst_pixel_x": int(x),

@@ -63,17 +63,20 @@ def from_images(
     truth: ProbeTruth,
     cells: int,
     quantum: float,
+    epsilon: float,
     mixed: NDArray[np.bool_],
     samples: int | None,
 ) -> RayMeasurement:
     """From coded images keyed by (plane, axis). Two planes give the direction.
 
-    `quantum` bounds the error of the renderer's codes: `Preflight.code_quantum`. `mixed` (m,) are
-    the rays that share their pixels with another path, `samples` the number of times that a
+    `quantum` bounds the error of the renderer's codes: `Preflight.code_quantum`, and `epsilon` is
+    the precision in which it evaluates a coordinate and its product with the cells. `mixed` (m,)
+    are the rays that share their pixels with another path, `samples` the number of times that a
     sampling renderer chose among them.
     """
     places = [
-        _place(images, index, plane, cells, quantum) for index, plane in enumerate(truth.planes)
+        _place(images, index, plane, cells, quantum, epsilon)
+        for index, plane in enumerate(truth.planes)
     ]
     point, uncertainty, seen, undecided, reasons = places[0]
     direction, direction_uncertainty = None, np.zeros(len(seen))
@@ -108,7 +111,7 @@ def surely_sampled(samples: int, rays: int) -> float:
 
 
 def _place(
-    images: Images, index: int, plane: Rectangle, cells: int, quantum: float
+    images: Images, index: int, plane: Rectangle, cells: int, quantum: float, epsilon: float
 ) -> tuple[Float, Float, NDArray[np.bool_], NDArray[np.bool_], dict[str, int]]:
     u, v = (decode(images[index, axis], cells, AMPLITUDE, quantum) for axis in AXES)
     frame = plane.frame
@@ -118,7 +121,9 @@ def _place(
         + ((u.coordinate - 0.5) * width)[:, None] * np.array(frame.x)
         + ((v.coordinate - 0.5) * height)[:, None] * np.array(frame.y)
     )
-    uncertainty = np.hypot(u.uncertainty * width, v.uncertainty * height)
+    uncertainty = np.hypot(
+        (u.uncertainty + 2 * epsilon) * width, (v.uncertainty + 2 * epsilon) * height
+    )
     seen = (u.reason == Reason.OK) & (v.reason == Reason.OK)
     dark = (u.reason == Reason.DARK) & (v.reason == Reason.DARK)
     return point, uncertainty, seen, ~seen & ~dark, _count(u, v)

@@ -43,6 +43,7 @@ class Decoded:
 def decode(pixels: NDArray[np.float32], cells: int, amplitude: float, quantum: float) -> Decoded:
     """Positions from `pixels` (..., 3), whose values are off by at most `quantum`.
 
+    Values above 1 may be off by that many times `quantum`, as floats are.
     With c = r / b and f = g / b the cell is round(c cells - f) and the coordinate (cell + f) /
     cells. Errors of r, g, b of at most q give |dc| <= q (1 + c) / (b - q) with the measured c and
     b, and df alike, so c cells - f strays from an integer by at most q (cells (1 + c) + 1 + f) /
@@ -55,7 +56,9 @@ def decode(pixels: NDArray[np.float32], cells: int, amplitude: float, quantum: f
     lit = finite & (b > lit_threshold(quantum))
     safe = np.where(lit, b, 1.0)
     c, f = np.where(lit, r, 0.0) / safe, np.where(lit, g, 0.0) / safe
-    share = quantum / np.where(lit, b - quantum, 1.0)
+    # A float above 1 is rounded in proportion: seen from inside glass, a plane shines n^2 times.
+    error = quantum * np.maximum(np.where(lit, b, 1.0), 1.0)
+    share = error / np.where(lit, b - error, 1.0)
     fine_error = share * (1 + np.abs(f))
     slack = share * cells * (1 + np.abs(c)) + fine_error
     position = c * cells - f

@@ -98,7 +98,8 @@ class Image:
     """`pixels` (H, W, 3) float32, linear Rec. 709 radiance, row 0 at the top.
 
     `variance` (H, W, 3) is the estimated variance of each pixel's mean where the renderer
-    samples, else None.
+    samples, else None. `closest` (H, W) is the shortest way between two surfaces, in scene units,
+    on any ray of the pixel whose loss would show; None where the renderer does not tell.
     """
 
     pixels: NDArray[np.float32]
@@ -106,6 +107,7 @@ class Image:
     seconds: float = 0.0  # the renderer's own time, start-up excluded where it says so
     log: str = ""
     command: str = ""  # what was run, for people to run again
+    closest: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True)

@@ -65,12 +65,12 @@ EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
 
 # An ordinary image is the mean of this many renders with seeds of their own, which tell its
 # variance; more samples per pixel are more samples per render.
-SEEDS = 32
-# A ray towards a position code is sampled until light arrives, at most this often: a path of
-# weight w is missed with the probability (1 - w)^256, which is 3e-5 at 4%.
-CODE_SAMPLES = 256
-CODE_SAMPLES_AT_ONCE = 16
-CODE_RAYS_AT_ONCE = 1 << 16  # with their samples 150 MB
+SEEDS = 8
+# A ray towards a position code is sampled until light arrives, a few times at first and at most
+# this often, or `settings.samples` if that is more.
+CODE_SAMPLES = 64
+CODE_SAMPLES_AT_FIRST = 4
+CODE_RAYS_AT_ONCE = 1 << 20  # samples of all rays together: 150 MB
 SEED_STRIDE = 1 << 16  # so that settings.seed and settings.seed + 1 share no seed
 
 Indices = NDArray[np.uint32]
@@ -195,7 +195,8 @@ class StockEngine(_Engine):
             return sums
 
         n = scene.film.width * scene.film.height
-        blocks = np.array_split(np.arange(n, dtype=np.uint32), -(-n // CODE_RAYS_AT_ONCE))
+        width = CODE_RAYS_AT_ONCE // CODE_SAMPLES_AT_FIRST
+        blocks = np.array_split(np.arange(n, dtype=np.uint32), -(-n // width))
         most = max(settings.samples, CODE_SAMPLES)
         return np.concatenate([_until_lit(sample, block, most) for block in blocks])
 
@@ -205,8 +206,9 @@ def _until_lit(sample: Callable[[Indices, int], Float], rays: Indices, most: int
     total, count = np.zeros((len(rays), 3)), np.zeros((len(rays), 1))
     dark = np.arange(len(rays))
     while dark.size and count[dark[0]] < most:
-        room = CODE_RAYS_AT_ONCE * CODE_SAMPLES_AT_ONCE // dark.size
-        times = int(min(room, most - count[dark[0], 0]))
+        done = int(count[dark[0], 0])
+        room = CODE_RAYS_AT_ONCE // dark.size if done else CODE_SAMPLES_AT_FIRST
+        times = min(room, most - done)
         total[dark] += sample(rays[dark], times)
         count[dark] += times
         dark = dark[~total[dark].any(axis=1)]

@@ -112,7 +112,11 @@ class WorkerRenderer:
             if reply.variance is not None:
                 variance, _ = delivered(reply.variance, scene.film, log=reply.log)
             log = "\n".join(filter(None, (reply.log, described(info))))
-            return Image(pixels, variance, reply.seconds or 0.0, log, reply.command)
+            closest = None
+            if reply.closest is not None:
+                closest = delivered(reply.closest, scene.film, log=reply.log)[0][..., 0]
+            seconds = reply.seconds or 0.0
+            return Image(pixels, variance, seconds, log, reply.command, closest)
 
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings

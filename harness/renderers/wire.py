@@ -37,6 +37,7 @@ class Reply(BaseModel):
     # render, trace, emit
     command: str = ""
     variance: Path | None = None
+    closest: Path | None = None
     vertices: Path | None = None
     file: Path | None = None
     # health

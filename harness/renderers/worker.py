@@ -106,6 +106,10 @@ class Server:
             variance = output.with_name(f"{output.stem}.variance.npy")
             imagefile.write_npy(variance, image.variance)
             reply["variance"] = str(variance)
+        if image.closest is not None:
+            closest = output.with_name(f"{output.stem}.closest.npy")
+            imagefile.write_npy(closest, image.closest[..., None].repeat(3, axis=2))
+            reply["closest"] = str(closest)
         return reply
 
     def _trace(self, request: Message) -> Message:
