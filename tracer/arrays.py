@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -161,13 +160,24 @@ def _table(rows: list[list[float]], columns: int) -> Floats:
     return table
 
 
-@lru_cache(maxsize=1)
+_kept: list[tuple[Scene, Arrays]] = []  # the last scene and its arrays
+
+
 def flatten(scene: Scene) -> Arrays:
     """Raises SceneError for what cannot be traced. `media[0]` is what the camera stands in.
 
     The last scene's arrays are kept, so that following rays through it in turn grows its trees
     once. The numpy arrays of a scene must not be changed afterwards.
     """
+    for known, arrays in _kept:
+        if known is scene:
+            return arrays
+    arrays = _flatten(scene)
+    _kept[:] = [(scene, arrays)]
+    return arrays
+
+
+def _flatten(scene: Scene) -> Arrays:
     into = _Flattener()
     into.medium(scene.around_camera)
     into.medium(VACUUM)

@@ -71,6 +71,13 @@ class Translucent:
     filter: float
     transmit: float
 
+    def __post_init__(self) -> None:
+        if not (self.filter >= 0.0 and self.transmit >= 0.0 and self.filter + self.transmit <= 1.0 + 1e-12):
+            raise SceneError(
+                "filter and transmit must be at least 0 and together at most 1, "
+                f"not {self.filter} and {self.transmit}"
+            )
+
 
 @dataclass(frozen=True)
 class ThinSlab:
@@ -79,6 +86,10 @@ class ThinSlab:
     medium: Medium
     thickness: float
     exterior: Medium = VACUUM
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.thickness < math.inf):
+            raise SceneError(f"a thin slab's thickness must be positive, not {self.thickness}")
 
 
 Material = Emissive | Diffuse | Mirror | Translucent | ThinSlab
@@ -96,6 +107,10 @@ class PointLight:
     position: Vec
     intensity: Vec  # radiant intensity
 
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(x) for x in (*self.position, *self.intensity)):
+            raise SceneError(f"a light needs finite numbers, not {self}")
+
 
 @dataclass(frozen=True)
 class Transport:
@@ -112,6 +127,12 @@ class Transport:
     reflection: bool = True
     transmission: bool = True
     radiance_n2: bool = False
+
+    def __post_init__(self) -> None:
+        if self.max_depth < 1:
+            raise SceneError(f"max_depth must be at least 1, not {self.max_depth}")
+        if not (0.0 <= self.min_weight < 1.0):
+            raise SceneError(f"min_weight must be at least 0 and below 1, not {self.min_weight}")
 
 
 @dataclass(frozen=True)

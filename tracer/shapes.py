@@ -30,14 +30,20 @@ COLUMNS = 14  # of the table that all shapes are written to
 # --- what a scene is built of ---------------------------------------------------------------------
 
 
+def _require_positive(shape: object, **sizes: float) -> None:
+    for name, size in sizes.items():
+        if not 0.0 < size < INF:
+            kind = shape if isinstance(shape, str) else type(shape).__name__.lower()
+            raise SceneError(f"{kind}: {name} must be positive and finite, not {size}")
+
+
 @dataclass(frozen=True)
 class Sphere:
     center: Vec
     radius: float
 
     def __post_init__(self) -> None:
-        if not self.radius > 0.0:
-            raise SceneError(f"a sphere's radius must be positive, not {self.radius}")
+        _require_positive(self, radius=self.radius)
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,9 @@ class Rectangle:
     z: Vec
     size: tuple[float, float]
 
+    def __post_init__(self) -> None:
+        _require_positive(self, width=self.size[0], height=self.size[1])
+
 
 @dataclass(frozen=True)
 class Disk:
@@ -91,6 +100,9 @@ class Disk:
     y: Vec
     z: Vec
     radius: float
+
+    def __post_init__(self) -> None:
+        _require_positive(self, radius=self.radius)
 
 
 def polyhedron(planes: list[Plane], vertices: list[Vec]) -> Cell:
@@ -104,6 +116,7 @@ def polyhedron(planes: list[Plane], vertices: list[Vec]) -> Cell:
 
 def cylinder(center: Vec, axis: Vec, radius: float, height: float) -> Cell:
     """Capped cylinder around `center`; `axis` is unit."""
+    _require_positive("cylinder", radius=radius, height=height)
     middle = sum(c * a for c, a in zip(center, axis, strict=True))
     back = (-axis[0], -axis[1], -axis[2])
     bounds = (
@@ -116,6 +129,7 @@ def cylinder(center: Vec, axis: Vec, radius: float, height: float) -> Cell:
 
 def cone(tip: Vec, axis: Vec, radius: float, height: float) -> Cell:
     """Cone that opens from `tip` along the unit vector `axis` to a base of `radius`."""
+    _require_positive("cone", radius=radius, height=height)
     slope = radius / height
     base = sum(t * a for t, a in zip(tip, axis, strict=True)) + height
     bounds = (Quadric(tip, axis, 0.0, 0.0, slope * slope), Plane(axis, base))
@@ -138,6 +152,7 @@ def lens(
     and is refused. `aperture` is the radius of the cylinder that is its edge; `conics` are the
     conic constants: 0 a sphere, -1 a paraboloid, below -1 a hyperboloid.
     """
+    _require_positive("lens", thickness=thickness, aperture=aperture)
     if not (radii[0] > 0.0 and (radii[1] < 0.0 or radii[1] == INF)):
         raise SceneError(f"a lens must be convex or plane on both sides, not {radii}")
     back = tuple(f + thickness * a for f, a in zip(front, axis, strict=True))

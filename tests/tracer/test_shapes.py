@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -25,10 +26,11 @@ from tracer.scene import (
     Shape,
     Solid,
     Surface,
+    ThinSlab,
     Translucent,
     Transport,
 )
-from tracer.shapes import Cell, Disk, Sphere, cone, cylinder, lens
+from tracer.shapes import Cell, Disk, Rectangle, Sphere, cone, cylinder, lens
 
 WHITE = (1.0, 1.0, 1.0)
 CAMERA = Perspective((0.3, 0.2, 6.0), X, Y, (0.0, 0.0, -1.0), 0.25)
@@ -93,6 +95,27 @@ def test_disk_is_round() -> None:
 def test_hollow_lenses_are_refused(radii: tuple[float, float]) -> None:
     with pytest.raises(SceneError, match="convex or plane"):
         lens((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), radii, 0.5, 0.4)
+
+
+BAD: dict[str, Callable[[], object]] = {
+    "sphere: radius": lambda: Sphere((0.0, 0.0, 0.0), 0.0),
+    "rectangle: height": lambda: Rectangle((0.0, 0.0, 0.0), X, Y, Z, (1.0, math.nan)),
+    "disk: radius": lambda: Disk((0.0, 0.0, 0.0), X, Y, Z, -1.0),
+    "cylinder: height": lambda: cylinder((0.0, 0.0, 0.0), Z, 1.0, math.inf),
+    "cone: radius": lambda: cone((0.0, 0.0, 0.0), Z, -1.0, 1.0),
+    "lens: thickness": lambda: lens((0.0, 0.0, 0.0), Z, (1.0, -1.0), 0.0, 0.5),
+    "thickness must be positive": lambda: ThinSlab(GLASS, 0.0),
+    "finite numbers": lambda: PointLight((0.0, math.nan, 0.0), WHITE),
+    "max_depth": lambda: Transport(0),
+    "min_weight": lambda: Transport(10, 1.0),
+    "together at most 1": lambda: Translucent(WHITE, 0.6, 0.5),
+}
+
+
+@pytest.mark.parametrize(("message", "make"), BAD.items(), ids=BAD.keys())
+def test_what_has_no_meaning_is_refused(message: str, make: Callable[[], object]) -> None:
+    with pytest.raises(SceneError, match=message):
+        make()
 
 
 def icosphere(subdivisions: int, smooth: bool) -> Mesh:

@@ -1,0 +1,50 @@
+"""What is compiled is what is written, and importing the package compiles nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import tracer
+
+PACKAGE = Path(tracer.__file__).parent
+
+
+def run(folder: Path, code: str) -> str:
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout.strip()
+
+
+def test_kernels_follow_a_change_in_what_they_call(tmp_path: Path) -> None:
+    """Numba alone looks at the file of the kernel only, and would keep the old code."""
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PACKAGE, tmp_path / "tracer", ignore=ignore)
+    code = "from tracer.optics import reflect; print(reflect((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))"
+    assert run(tmp_path, code) == "(1.0, 0.0, 0.0)"
+    assert run(tmp_path, code) == "(1.0, 0.0, 0.0)"  # now from the cache
+    called = tmp_path / "tracer" / "vector.py"
+    right = called.read_text(encoding="utf-8")
+    wrong = right.replace("return a[0] * b[0] +", "return a[0] * b[0] -")
+    assert wrong != right
+    called.write_text(wrong, encoding="utf-8")
+    assert run(tmp_path, code) != "(1.0, 0.0, 0.0)"
+
+
+def test_importing_the_package_imports_no_compiler() -> None:
+    code = "import sys, tracer; print('numba' in sys.modules, 'numpy' in sys.modules)"
+    assert run(PACKAGE.parent, code) == "False False"
+
+
+def test_everything_it_offers_is_there() -> None:
+    assert all(hasattr(tracer, name) for name in tracer.__all__)
