@@ -22,8 +22,9 @@ from harness.results import Contender, Results
 
 LOG_LINES = 40
 # The range of all difference maps, so that they can be compared: a float32 renderer's errors show
-# as dark, what an eye could see as bright.
+# as dark, what an eye could see as bright. Noise of a sampled picture needs a wider one.
 DIFFERENCE_LIMIT = 1e-3
+NOISE_LIMIT = 0.1
 
 
 def folder_name(case_id: str) -> str:
@@ -156,10 +157,12 @@ class Archive:
             ):  # fmt: skip
                 pictures[contender.name] = image.pixels
         maps = []
+        noisy = {c.name for c in contenders if c.preflight and c.preflight.noisy}
         for a, b in combinations(pictures, 2):
+            limit = NOISE_LIMIT if noisy & {a, b} else DIFFERENCE_LIMIT
             path = f"images/{name}/difference-{a}-{b}.webp"
-            write_difference(pictures[a], pictures[b], DIFFERENCE_LIMIT, self.root / path)
-            maps.append(DifferenceMap(a=a, b=b, path=path, limit=DIFFERENCE_LIMIT, unit="radiance"))
+            write_difference(pictures[a], pictures[b], limit, self.root / path)
+            maps.append(DifferenceMap(a=a, b=b, path=path, limit=limit, unit="radiance"))
         return maps
 
 

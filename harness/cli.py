@@ -6,6 +6,7 @@ Exit codes, everywhere the same: 0 all passed, 1 a check failed, 2 bad usage or 
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -58,6 +59,9 @@ def reports_errors(command: Command) -> Command:
 @click.version_option(__version__, prog_name="snellcheck")
 def main() -> None:
     """Does a renderer refract light correctly, by how much is it off, and why?"""
+    for stream in (sys.stdout, sys.stderr):  # an ASCII terminal has no check marks
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 scenes_option = click.option(

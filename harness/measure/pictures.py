@@ -96,7 +96,11 @@ class PicturePair:
                     crowded, detail,
                 )  # fmt: skip
             case Observable.MAX_DIFFERENCE:
-                return self._largest(keep, crowded)
+                return self._largest(
+                    self.difference, self.tolerance, crowded,
+                    "quanta of both pictures + light cut by weight + roundings of weights + change "
+                    "of the pixel when the camera moves by the renderers' geometric error",
+                )  # fmt: skip
             case Observable.P999_DIFFERENCE:
                 value = float(np.quantile(self.difference[keep], 0.999))
                 limit = float(np.quantile(self.tolerance[keep], 0.999))
@@ -105,26 +109,26 @@ class PicturePair:
                     crowded, self._counts(),
                 )  # fmt: skip
             case Observable.DELTA_E:
-                value = float(images.delta_e(self.a, self.b)[keep].max())
-                limit = images.LAB_SLOPE * float(self.tolerance[keep].max())
-                return Comparison(
-                    value, 0.0, limit, value <= limit,
-                    "largest pixel tolerance x steepest slope of CIE Lab", crowded, self._counts(),
+                return self._largest(
+                    images.delta_e(self.a, self.b), images.LAB_SLOPE * self.tolerance, crowded,
+                    "pixel's tolerance x steepest slope of CIE Lab",
                 )  # fmt: skip
         raise Unmeasurable(f"{observable} is not an observable of two pictures")
 
-    def _largest(self, keep: Mask, crowded: str) -> Comparison:
-        ratio = np.where(keep, self.difference / self.tolerance, -np.inf)
+    def _largest(
+        self, difference: Float, tolerance: Float, crowded: str, derivation: str
+    ) -> Comparison:
+        """The pixel that comes closest to its limit, of those that graze no edge."""
+        ratio = np.where(self.grazing, -np.inf, difference / tolerance)
         y, x = np.unravel_index(int(ratio.argmax()), ratio.shape)
+        detail = self._counts() | {
+            "max": float(difference[~self.grazing].max()),
+            "worst_pixel_x": int(x),
+            "worst_pixel_y": int(y),
+        }
         return Comparison(
-            float(self.difference[y, x]), 0.0, float(self.tolerance[y, x]),
-            bool(ratio[y, x] <= 1),
-            "quanta of both pictures + light cut by weight + roundings of weights + change of the "
-            "pixel when the camera moves by the renderers' geometric error",
-            crowded,
-            self._counts()
-            | {"max": float(self.difference[keep].max()), "worst_pixel_x": int(x),
-               "worst_pixel_y": int(y)},
+            float(difference[y, x]), 0.0, float(tolerance[y, x]), bool(ratio[y, x] <= 1),
+            derivation, crowded, detail,
         )  # fmt: skip
 
     def _counts(self) -> dict[str, float | int | str]:
