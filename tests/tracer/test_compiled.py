@@ -35,7 +35,7 @@ def test_kernels_follow_a_change_in_what_they_call(tmp_path: Path) -> None:
     assert run(tmp_path, code) == "(1.0, 0.0, 0.0)"  # now from the cache
     called = tmp_path / "tracer" / "vector.py"
     right = called.read_text(encoding="utf-8")
-    wrong = right.replace("return a[0] * b[0] +", "return a[0] * b[0] -")
+    wrong = right.replace("return a[0] * b[0]", "return -a[0] * b[0]")
     assert wrong != right
     called.write_text(wrong, encoding="utf-8")
     assert run(tmp_path, code) != "(1.0, 0.0, 0.0)"
