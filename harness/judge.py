@@ -83,7 +83,7 @@ class CaseJudge:
                     if curve is not None:
                         _merge(judgement.curves, spec, curve, contender.name)
             else:
-                judgement.checks += self._pairs.checks(spec, contenders)
+                judgement.checks += self._pairs.checks(spec, contenders, self._contenders)
         return judgement
 
     def _against_truth(

@@ -53,8 +53,13 @@ class PairJudge:
         self._scene, self._results, self._helper = scene, results, helper
         self._made: dict[tuple[str, str], PicturePair] = {}
 
-    def checks(self, spec: model.CheckSpec, contenders: list[Contender]) -> Iterator[Check]:
-        """All pairs without noise, and each sampling renderer against the helper's area means."""
+    def checks(
+        self, spec: model.CheckSpec, contenders: list[Contender], everyone: list[Contender]
+    ) -> Iterator[Check]:
+        """All pairs without noise, and each sampling renderer against the helper's area means.
+
+        With a named opponent, each of the contenders against that one of `everyone`.
+        """
         ready = []
         for contender in contenders:
             try:
@@ -63,17 +68,37 @@ class PairJudge:
             except NotAvailable as gap:
                 yield unmeasured(spec, contender.name, spec.against, gap.status, gap.reason)
         exact = [c for c in ready if not c.ready().noisy]
-        if len(exact) < 2:
+        if spec.against == "renderers":
+            yield from self._all_pairs(spec, exact)
+        else:
+            opponent = next((c for c in everyone if c.name == spec.against), None)
             for contender in exact:
-                reason = "no other renderer without noise shows this picture"
-                yield unmeasured(spec, contender.name, spec.against, Verdict.SKIP, reason)
-        for a, b in combinations(exact, 2):
-            if spec.against in ("renderers", a.name, b.name):
-                first, second = (b, a) if spec.against == a.name else (a, b)
-                yield self._exact(spec, first, second)
+                if contender is not opponent:
+                    yield self._against(spec, contender, opponent)
         for contender in ready:
             if contender.ready().noisy:
                 yield from self._sampled(spec, contender)
+
+    def _all_pairs(self, spec: model.CheckSpec, exact: list[Contender]) -> Iterator[Check]:
+        if len(exact) == 1:
+            reason = "no other renderer without noise shows this picture"
+            yield unmeasured(spec, exact[0].name, spec.against, Verdict.SKIP, reason)
+        for a, b in combinations(exact, 2):
+            yield self._exact(spec, a, b)
+
+    def _against(
+        self, spec: model.CheckSpec, contender: Contender, opponent: Contender | None
+    ) -> Check:
+        try:
+            if opponent is None:
+                raise NotAvailable(Verdict.SKIP, "it is not part of this run")
+            self._results.picture(opponent, plan.IMAGE)
+            if opponent.ready().noisy:
+                raise NotAvailable(Verdict.SKIP, "its pictures are noisy")
+        except NotAvailable as gap:
+            reason = f"{spec.against} shows no picture to compare with: {gap.reason}"
+            return unmeasured(spec, contender.name, spec.against, Verdict.SKIP, reason)
+        return self._exact(spec, contender, opponent)
 
     def _exact(self, spec: model.CheckSpec, a: Contender, b: Contender) -> Check:
         try:

@@ -52,6 +52,8 @@ class PicturePair:
             raise Unmeasurable(f"pictures differ in size: {self.a.shape} and {self.b.shape}")
         if not (np.isfinite(self.a).all() and np.isfinite(self.b).all()):
             raise Unmeasurable("a picture holds values that are not finite")
+        if self.data_range <= 0:
+            raise Unmeasurable("both pictures are black")
 
     @cached_property
     def difference(self) -> Float:
