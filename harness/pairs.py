@@ -112,7 +112,7 @@ class PairJudge:
             comparison = SampledPicture(
                 self._results.picture(contender, plan.IMAGE),
                 self._results.picture(contender, plan.SECOND_IMAGE),
-                self._area, self._base,
+                self._area, self._base, plan.AREA_FACTOR,
             ).compare(Observable(spec.observable))  # fmt: skip
         except NotAvailable as gap:
             yield unmeasured(spec, contender.name, self._helper, gap.status, gap.reason)

@@ -38,6 +38,19 @@ def sensitivity(picture: Pixels, shifted: Sequence[Pixels]) -> Float:
     return np.asarray(np.max([images.difference(picture, other) for other in shifted], axis=0))
 
 
+def area_error(center: Pixels, samples_a_side: int) -> Float:
+    """(H, W, 3) how far the mean of n x n regular samples may be from the mean over a pixel's area.
+
+    An edge through a pixel parts it into two levels, which differ by at most the contrast of the
+    neighbourhood; regular samples find its place to within half their distance.
+    """
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    near = (3, 3, 1)
+    contrast = maximum_filter(center, near).astype(np.float64) - minimum_filter(center, near)
+    return np.asarray(contrast / (2 * samples_a_side))
+
+
 @dataclass(frozen=True)
 class PicturePair:
     """Two pictures without noise. `tolerance` (H, W) bounds their difference, pixel by pixel."""
@@ -147,14 +160,15 @@ class PicturePair:
 class SampledPicture:
     """A picture by a renderer that samples, twice with independent seeds, and what it estimates.
 
-    `reference` is the mean over each pixel's area of a picture without noise, and `center` the same
-    picture at pixel centres.
+    `reference` is the mean over each pixel's area of a picture without noise, of `samples_a_side`
+    squared samples, and `center` the same picture at pixel centres.
     """
 
     first: Pixels
     second: Pixels
     reference: Pixels
     center: Pixels
+    samples_a_side: int
 
     def compare(self, observable: Observable) -> Comparison | None:
         """None for observables that noise leaves without a bound."""
@@ -174,9 +188,7 @@ class SampledPicture:
             case Observable.RMSE:
                 value = images.rmse(self.first, self.reference, everything)
                 own = images.rmse(self.first, self.second, everything) / np.sqrt(2)
-                # A mean over n x n regular samples errs by order 1/n at an edge: the step from 1
-                # to 4 samples a side is 3/4 of the first error, of which 1/4 is left.
-                left = images.rmse(self.center, self.reference, everything) / 3
+                left = float(np.sqrt(np.mean(area_error(self.center, self.samples_a_side) ** 2)))
                 # The variance of N pixels is known to sqrt(2 / N) of itself, times the kurtosis
                 # of a lobe-sampled pixel, of order 10; five standard errors of that.
                 spread = 1 + 5 * np.sqrt(2 * 10 / self.first.size) / 2
