@@ -24,6 +24,7 @@ CAPABILITIES = frozenset(
         Capability.IMAGE,
         Capability.PIXEL_CENTRES,
         Capability.DOUBLE,
+        Capability.DOUBLE_DATA,
         Capability.LOBE_SWITCH,
         Capability.SPHERE,
         Capability.CONVEX,
