@@ -38,8 +38,11 @@ def _sphere_chord(sphere: Sphere, o: Float, d: Float) -> Chord:
     return Chord(t_in, t_out, n_in, n_out)
 
 
-def _planes_chord(planes: Float, o: Float, d: Float, chunk: int = 2_000_000) -> Chord:
-    """`planes` (k, 4) as n . p <= w. Works through `chunk` plane-ray pairs at a time."""
+def _planes_chord(planes: Float, o: Float, d: Float, chunk: int = 1 << 15) -> Chord:
+    """`planes` (k, 4) as n . p <= w.
+
+    Works through `chunk` plane-ray pairs at a time, few enough to stay in the processor's cache.
+    """
     m = len(o)
     out = [np.empty(m), np.empty(m), np.empty((m, 3)), np.empty((m, 3))]
     step = max(1, chunk // len(planes))

@@ -9,7 +9,7 @@ from harness.expected import Float
 from harness.measure.probe_truth import ProbeTruth
 from harness.record import Curve, Series
 
-POINTS = 160
+POINTS = 96
 
 
 def curve_of_rows(

@@ -19,7 +19,7 @@ def binned(value: Float, true: Float, order: NDArray[np.intp], level: float) -> 
     of the renderer's sampling. Judged by Student's t; `level` is the chance of a false alarm over
     all bins and channels together (Šidák 1967).
     """
-    from scipy.stats import t as student
+    from scipy.special import stdtrit
 
     if len(order) < BIN:
         raise Unmeasurable(f"{len(order)} pixels are too few: a bin needs {BIN}")
@@ -27,7 +27,7 @@ def binned(value: Float, true: Float, order: NDArray[np.intp], level: float) -> 
     residual = np.array([(value[b] - true[b]).mean(axis=0) for b in bins])
     scatter = np.array([(value[b] - true[b]).std(axis=0, ddof=1) / np.sqrt(len(b)) for b in bins])
     per_test = 1 - (1 - level) ** (1 / residual.size)
-    limit = float(student.isf(per_test / 2, BIN - 1))
+    limit = -float(stdtrit(BIN - 1, per_test / 2))
     if not np.isfinite(residual).all():
         raise Unmeasurable("a measured pixel is not finite")
     # Where all samples of a bin fell alike it shows no scatter, though one more sample of its 64

@@ -65,7 +65,7 @@ EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
 
 # An ordinary image is the mean of this many renders with seeds of their own, which tell its
 # variance; more samples per pixel are more samples per render.
-SEEDS = 8
+SEEDS = 16
 # A ray towards a position code is sampled until light arrives, a few times at first and at most
 # this often, or `settings.samples` if that is more.
 CODE_SAMPLES = 64
