@@ -355,9 +355,9 @@ def test_what_is_translated_for_mitsuba_is_a_scene_file(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_command_itself_with_the_tracer_that_comes_along(tmp_path: Path) -> None:
     """A process of its own, as scripts start it."""
+    command = [sys.executable, "-c", "from harness.cli import main; main()"]
     done = subprocess.run(
-        [sys.executable, "-c", "from harness.cli import main; main()", "run", "snell", "-r", "tracer",
-         "--scenes", str(SCENES), "--out", str(tmp_path)],
+        [*command, "run", "snell", "-r", "tracer", "--scenes", str(SCENES), "--out", str(tmp_path)],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
