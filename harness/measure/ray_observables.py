@@ -161,7 +161,10 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, precision: Precis
 
 
 def tir(truth: ProbeTruth, rays: RayMeasurement, _precision: Precision) -> Comparison:
-    """Rays lit where there is total internal reflection, or dark where light must pass."""
+    """Rays lit where there is total internal reflection, or dark where light must pass.
+
+    A ray API must call it by its name: a ray that is sent along the surface is dark, too.
+    """
     fate = truth.paths.status
     clear = ~truth.grazing & ~rays.faint & ~rays.mixed & np.isin(fate, (Status.HIT, Status.TIR))
     if not (clear & (fate == Status.TIR)).any() or not (clear & (fate == Status.HIT)).any():
@@ -170,6 +173,9 @@ def tir(truth: ProbeTruth, rays: RayMeasurement, _precision: Precision) -> Compa
     lit = rays.seen | rays.undecided
     leaked = clear & (fate == Status.TIR) & lit
     lost = clear & (fate == Status.HIT) & on_plane & ~lit
+    if rays.reflected is not None:
+        leaked |= clear & (fate == Status.TIR) & ~rays.reflected
+        lost |= clear & (fate == Status.HIT) & rays.reflected
     wrong = int(leaked.sum() + lost.sum())
     detail: dict[str, float | int | str] = {
         "rays": int(clear.sum()), "lit_beyond_critical": int(leaked.sum()),

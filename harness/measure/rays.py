@@ -27,7 +27,8 @@ class RayMeasurement:
 
     `seen` (m,) tells that the ray reached the plane; `undecided` (m,) that a pixel held light which
     does not decode. `faint` (m,) marks rays whose light is too weak to be demanded. The
-    uncertainties (m,) are what the image's quantum alone allows: units and radians.
+    uncertainties (m,) are what the image's quantum alone allows: units and radians. `reflected`
+    (m,) is what a ray API says of total internal reflection; images only show darkness.
     """
 
     point: Float
@@ -40,6 +41,7 @@ class RayMeasurement:
     direction_uncertainty: Float
     reasons: dict[str, int]
     method: str
+    reflected: NDArray[np.bool_] | None = None
 
 
 def from_paths(paths: RayPaths) -> RayMeasurement:
@@ -54,7 +56,7 @@ def from_paths(paths: RayPaths) -> RayMeasurement:
     missing = ~seen[:, None]
     return RayMeasurement(
         np.where(missing, np.nan, paths.point), np.where(missing, np.nan, paths.direction),
-        seen, nothing, nothing, nothing, none, none, names, "ray API",
+        seen, nothing, nothing, nothing, none, none, names, "ray API", paths.status == Status.TIR,
     )  # fmt: skip
 
 
