@@ -125,7 +125,11 @@ class Health:
 
 @runtime_checkable
 class Renderer(Protocol):
-    """The one seam between harness and renderers."""
+    """The one seam between harness and renderers.
+
+    A renderer may also have `concurrency`, how many renders at a time serve it best (1 where it
+    says nothing), and `close()`, which ends its process.
+    """
 
     @property
     def name(self) -> str: ...

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from harness.cores import core_count
 from harness.errors import InputError, RendererError, RendererFailed, RendererMissing, nearest
 from harness.imagefile import Encoding
 from harness.renderers.base import Capability, Health, Image, RenderSettings
@@ -104,6 +105,9 @@ class CommandRenderer:
     Without a declared `version` it is the hash of the files that the command names, so that a
     changed program is another version.
     """
+
+    # A small renderer uses one core.
+    concurrency = core_count()
 
     def __init__(
         self,

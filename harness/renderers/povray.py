@@ -57,6 +57,8 @@ class PovRayRenderer:
     """
 
     name = "povray"
+    # A process sleeps most of its time: eight keep two cores busy.
+    concurrency = 8
     capabilities = frozenset(
         {
             Capability.DOUBLE,
