@@ -191,7 +191,10 @@ def _extent(scene: ResolvedScene, rays: Rays, landings: tuple[Landing, ...]) -> 
 
 
 def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays, float]]:
-    """The rays moved sideways by `step` and tilted by `STEP`, along two perpendicular axes."""
+    """The rays moved sideways by `step` and tilted by `STEP`, along two perpendicular axes.
+
+    They are tilted the other way, so that an edge is found on whichever side of the ray it is.
+    """
     d = rays.directions
     helper = np.where((np.abs(d[:, :1]) < 0.6), [[1.0, 0, 0]], [[0, 1.0, 0]])
     e1 = np.cross(d, helper)
@@ -200,7 +203,7 @@ def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays, float]]:
     out = []
     for e in (e1, e2):
         out.append(("origin", Rays(rays.origins + step * e, d), step))
-        tilted = d + STEP * e
+        tilted = d - STEP * e
         tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
         out.append(("direction", Rays(rays.origins, tilted), STEP))
     return out
