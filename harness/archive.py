@@ -16,8 +16,10 @@ from harness.errors import RendererError, RendererFailed
 from harness.judge import Judgement
 from harness.measure.images import Pixels
 from harness.plan import PreparedCase
+from harness.probe.scenes import AXES
+from harness.probe.view import view_of_codes, view_of_rays
 from harness.record import CaseRecord, DifferenceMap, ImageFile, RendererRun, Table, Verdict, worst
-from harness.renderers.base import Image, RenderSettings
+from harness.renderers.base import Image, RayPaths, RenderSettings
 from harness.results import Contender, Results
 
 LOG_LINES = 40
@@ -56,7 +58,7 @@ class Archive:
         loaded, name = case.loaded, folder_name(case.loaded.id)
         scene_json = case.scene.model_dump_json()
         record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
-        runs = [self._run(c, name, results, judgement, seconds, settings) for c in contenders]
+        runs = [self._run(case, c, name, results, judgement, seconds, settings) for c in contenders]
         written = CaseRecord(
             id=loaded.id,
             case=loaded.case,
@@ -86,6 +88,7 @@ class Archive:
 
     def _run(
         self,
+        case: PreparedCase,
         contender: Contender,
         name: str,
         results: Results,
@@ -116,15 +119,17 @@ class Archive:
             command=next((i.command for i in images if i.command), ""),
             log_tail="\n".join(logs[0].splitlines()[-LOG_LINES:]) if logs else "",
             settings=dataclasses.asdict(settings),
-            images=self._images(contender.name, name, mine),
+            images=self._images(case, contender.name, name, mine),
         )
 
-    def _images(self, renderer: str, name: str, mine: Mapping[str, object]) -> list[ImageFile]:
+    def _images(
+        self, case: PreparedCase, renderer: str, name: str, mine: Mapping[str, object]
+    ) -> list[ImageFile]:
         from harness import imagefile
         from harness.report.pictures import write_picture, write_thumbnail
 
         files = []
-        for role, shown in _shown(mine):
+        for role, shown in _shown(case, mine):
             stem = f"images/{name}/{renderer}-{role}"
             imagefile.write_exr(self.root / f"{stem}.exr", shown)
             write_picture(shown, self.root / f"{stem}.webp")
@@ -166,18 +171,22 @@ class Archive:
         return maps
 
 
-def _shown(mine: Mapping[str, object]) -> Iterator[tuple[str, Pixels]]:
-    """The pictures worth keeping, by role: a scene's own, or how its first probe looks."""
-    for role in (plan.IMAGE, plan.VIEW):
-        image = mine.get(role)
-        if isinstance(image, Image):
-            yield role, image.pixels
-            return
-    coded = [image for role, image in mine.items() if "plane 0 u" in role]
-    lit = [image for role, image in mine.items() if role.endswith(": light")]
-    for image in (*coded, *lit)[:1]:
-        if isinstance(image, Image):
-            yield plan.VIEW, plan.coarse_view(image.pixels) if coded else image.pixels
+def _shown(case: PreparedCase, mine: Mapping[str, object]) -> Iterator[tuple[str, Pixels]]:
+    """The picture worth keeping, by role: the scene's own, or how its first probe looks."""
+    image = mine.get(plan.IMAGE)
+    if isinstance(image, Image):
+        yield plan.IMAGE, image.pixels
+    elif case.loaded.model.probes:
+        probe = case.probe(None)
+        traced = mine.get(plan.trace_role(probe))
+        coded = mine.get(plan.code_role(probe, 0, AXES[0]))
+        lit = mine.get(plan.light_role(probe))
+        if isinstance(traced, RayPaths):
+            yield "probe", view_of_rays(traced, case.planes(probe)[0], case.scene.film)
+        elif isinstance(coded, Image):
+            yield "probe", view_of_codes(coded.pixels)
+        elif isinstance(lit, Image):
+            yield "probe", lit.pixels
 
 
 def scene_text(case: PreparedCase) -> str:

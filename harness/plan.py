@@ -9,9 +9,6 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from harness.measure.images import Pixels
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.preflight import Preflight
 from harness.probe.scenes import AXES, code_scene, light_scene
@@ -22,9 +19,6 @@ from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve
 from harness.scene.resolved import Film, Rectangle, ResolvedScene
 
 IMAGE = "image"
-# How a probe looks: coarse codes, for people; nothing is measured on it.
-VIEW = "view"
-VIEW_CELLS = 8
 SECOND_IMAGE = "image, second seed"
 BASE_IMAGE = "unshifted"
 AREA_IMAGE = "area"
@@ -99,10 +93,6 @@ def jobs_of(
     for probe in case.loaded.model.probes:
         planes = case.planes(probe)
         jobs += _probe_jobs(scene, probe, planes, renderer, capabilities, preflight, settings)
-    if not case.wants_images and Capability.RAYS in capabilities:
-        probe = case.probe(None)
-        view = code_scene(scene, case.planes(probe)[0], AXES[0], VIEW_CELLS, probe.path)
-        jobs.append(Job(renderer, VIEW, view, settings))
     return jobs
 
 
@@ -171,12 +161,3 @@ def trace_role(probe: model.Probe) -> str:
 
 def code_role(probe: model.Probe, plane: int, axis: str) -> str:
     return f"{probe.name}: plane {plane} {axis}"
-
-
-def coarse_view(coded: Pixels) -> Pixels:
-    """What a picture of a fine position code would look like with `VIEW_CELLS` cells."""
-    shown = np.nan_to_num(coded, posinf=0, neginf=0)
-    level = shown[..., 2:]
-    coarse = np.divide(shown[..., :1], level, out=np.zeros_like(level), where=level > 0)
-    cells = np.mod(VIEW_CELLS * coarse, 1)
-    return np.asarray(level * np.concatenate([coarse, cells, np.ones_like(level)], axis=-1))
