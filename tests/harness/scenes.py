@@ -22,7 +22,8 @@ def slab(top: float, bottom: float, half: float = 1000.0) -> rs.Convex:
     """Between the planes z = top and z = bottom."""
     sides = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)]
     planes = ((0, 0, 1, top), (0, 0, -1, -bottom), *((*n, half) for n in sides))
-    return rs.Convex(planes=planes, vertices=(), faces=())
+    corners = ((x, y, z) for x in (half, -half) for y in (half, -half) for z in (top, bottom))
+    return rs.Convex(planes=planes, vertices=tuple(corners), faces=())
 
 
 def prism(apex: float, side: float = 10.0) -> rs.Convex:
