@@ -72,7 +72,8 @@ class Translucent:
     transmit: float
 
     def __post_init__(self) -> None:
-        if not (self.filter >= 0.0 and self.transmit >= 0.0 and self.filter + self.transmit <= 1.0 + 1e-12):
+        passing = self.filter + self.transmit
+        if not (self.filter >= 0.0 and self.transmit >= 0.0 and passing <= 1.0 + 1e-12):
             raise SceneError(
                 "filter and transmit must be at least 0 and together at most 1, "
                 f"not {self.filter} and {self.transmit}"
