@@ -180,8 +180,9 @@ class _Session:
             quality=self.quality, started=self.started, wall_s=time.perf_counter() - state.started,
         )  # fmt: skip
         self.finished[index] = SummaryCase(
-            id=written.id, family=written.family, status=written.status, checks=written.checks
-        )
+            id=written.id, family=written.family, status=written.status, checks=written.checks,
+            diagnoses=written.diagnoses,
+        )  # fmt: skip
         state.results.clear()
 
     def summary(self, command: str) -> Summary:
