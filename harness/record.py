@@ -168,6 +168,7 @@ class CaseRecord(Model):
     differences: list[DifferenceMap] = Field(default_factory=list)
     tables: list[Table] = Field(default_factory=list)
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: scene.json …
+    pack: str | None = None  # relative path: pixels and rays as numbers, for the report's pages
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"

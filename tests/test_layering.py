@@ -34,7 +34,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight"),
     ("report",),
-    ("plan", "results", "pairs", "judge", "archive", "lanes", "run"),
+    ("plan", "results", "pairs", "judge", "packing", "archive", "lanes", "run"),
     ("doctor",),
     ("show", "cli"),
 )
