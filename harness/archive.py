@@ -188,7 +188,9 @@ def _shown(case: PreparedCase, mine: Mapping[str, object]) -> Iterator[tuple[str
         coded = mine.get(plan.code_role(probe, 0, AXES[0]))
         lit = mine.get(plan.light_role(probe))
         if isinstance(traced, RayPaths):
-            yield "probe", view_of_rays(traced, case.planes(probe)[0], case.scene.film)
+            view = view_of_rays(traced, case.planes(probe)[0], case.scene.film)
+            if view is not None:
+                yield "probe", view
         elif isinstance(coded, Image):
             yield "probe", view_of_codes(coded.pixels)
         elif isinstance(lit, Image):
