@@ -26,7 +26,7 @@ LAYERS = (
     ("record", "imagefile", "expected", "measure.observables"),
     ("scene",),
     ("renderers.base",),
-    ("camera", "chord", "translate"),
+    ("camera", "chord", "section", "translate"),
     ("truth",),
     ("renderers",),
     ("probe",),
