@@ -149,6 +149,9 @@ class CaseJudge:
             paths = self._results.get(contender, plan.trace_role(probe))
             if not isinstance(paths, RayPaths):
                 raise NotAvailable(Verdict.ERROR, "the trace delivered an image")
+            if len(paths.status) != len(truth.grazing):
+                reason = f"the trace delivered {len(paths.status)} of {len(truth.grazing)} rays"
+                raise NotAvailable(Verdict.ERROR, reason)
             return from_paths(paths)
         images = {
             (index, axis): self._results.picture(contender, plan.code_role(probe, index, axis))
