@@ -6,6 +6,7 @@ renderer that is absent, failed or cannot do it is named with its reason, never 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +17,7 @@ from harness.measure import light_observables, radiance, ray_observables
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.measure.probe_truth import ProbeTruth, probe_truth
+from harness.measure.raymap import ProbeRays
 from harness.measure.rays import RayMeasurement, from_images, from_paths
 from harness.pairs import PairJudge
 from harness.plan import PreparedCase
@@ -50,10 +52,14 @@ BOUNDARIES = {
 
 @dataclass
 class Judgement:
-    """All checks of a case in the order of its scene file, their curves, and why who is off."""
+    """All checks of a case in the order of its scene file, their curves, and why who is off.
+
+    `rays` are those that were measured on the way, probe by probe.
+    """
 
     checks: list[Check] = field(default_factory=list)
     curves: list[Curve] = field(default_factory=list)
+    rays: list[ProbeRays] = field(default_factory=list)
     diagnoses: list[Diagnosis] = field(default_factory=list)
 
 
@@ -89,7 +95,14 @@ class CaseJudge:
         explainer = Explainer(self._case, self._results, self._truth, self._measured)
         found = (explainer.explain(c, judgement.checks) for c in self._contenders)
         judgement.diagnoses = [diagnosis for diagnosis in found if diagnosis is not None]
+        judgement.rays = [ProbeRays(*item) for item in self._measured_probes()]
         return judgement
+
+    def _measured_probes(self) -> Iterator[tuple[str, ProbeTruth, dict[str, RayMeasurement]]]:
+        for probe, truth in self._truths.items():
+            measured = {name: rays for (name, of), rays in self._rays.items() if of == probe}
+            if measured:
+                yield probe, truth, measured
 
     def _against_truth(
         self, spec: model.CheckSpec, contender: Contender
@@ -141,6 +154,9 @@ class CaseJudge:
             paths = self._results.get(contender, plan.trace_role(probe))
             if not isinstance(paths, RayPaths):
                 raise NotAvailable(Verdict.ERROR, "the trace delivered an image")
+            if len(paths.status) != len(truth.grazing):
+                reason = f"the trace delivered {len(paths.status)} of {len(truth.grazing)} rays"
+                raise NotAvailable(Verdict.ERROR, reason)
             return from_paths(paths)
         images = {
             (index, axis): self._results.picture(contender, plan.code_role(probe, index, axis))

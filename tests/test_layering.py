@@ -26,7 +26,7 @@ LAYERS = (
     ("record", "imagefile", "expected", "law", "measure.observables"),
     ("scene",),
     ("renderers.base",),
-    ("camera", "chord", "translate"),
+    ("camera", "chord", "section", "translate"),
     ("truth",),
     ("renderers",),
     ("probe",),
@@ -35,7 +35,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight"),
     ("report",),
-    ("plan", "results", "pairs", "explain", "judge", "archive", "lanes", "run"),
+    ("plan", "results", "pairs", "explain", "judge", "packing", "archive", "lanes", "run"),
     ("doctor",),
     ("show", "cli"),
 )

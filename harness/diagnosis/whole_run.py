@@ -53,7 +53,8 @@ def diagnose_run(
     renderer: str, by_case: Mapping[str, Diagnosis], witnesses: Sequence[Witness]
 ) -> list[Diagnosis]:
     """The causes of what is wrong with `renderer`, the one that explains most cases first."""
-    left, found = dict(by_case), []
+    left = dict(by_case)
+    found: list[Diagnosis] = []
     while left and len(found) < MOST_CAUSES:
         ranked = _ranked(left, witnesses)
         best = ranked[0]
