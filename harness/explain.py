@@ -12,6 +12,7 @@ from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
 from harness.diagnosis.whole_run import Witness, diagnose_run
 from harness.measure.comparison import Unmeasurable
+from harness.measure.observables import Observable
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.rays import RayMeasurement
 from harness.plan import PreparedCase
@@ -75,6 +76,9 @@ class Explainer:
 MOST_WITNESSES = 24
 WITNESS_RAYS = 48
 # A renderer that passed deviates by less than its tolerances: as a rule, by less than these.
+BOUNDARIES = {
+    Observable.TIR, Observable.CRITICAL_ANGLE, Observable.FIRST_TRANSMITTING_ANGLE
+}  # fmt: skip
 POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
 
 
@@ -108,10 +112,16 @@ def _witnesses(
             if len(files) > MOST_WITNESSES:
                 return
             try:
-                evidence = tuple(_truth_as_evidence(case, p) for p in case.loaded.model.probes)
+                evidence = tuple(_truth_as_evidence(case, probe) for probe in _measuring(case))
             except ValueError:
                 continue  # no closed form
             yield Witness(case.loaded.id, evidence)
+
+
+def _measuring(case: PreparedCase) -> list[model.Probe]:
+    """The probes of which every ray is checked, not only where light ends."""
+    used = {c.probe for c in case.loaded.model.checks if c.observable not in BOUNDARIES}
+    return [probe for probe in case.loaded.model.probes if probe.name in used]
 
 
 def _truth_as_evidence(case: PreparedCase, probe: model.Probe) -> Evidence:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness import plan
+from harness.attribution import attributed
 from harness.explain import Explainer
 from harness.measure import light_observables, radiance, ray_observables
 from harness.measure.comparison import Comparison, Unmeasurable
@@ -92,6 +93,7 @@ class CaseJudge:
                         _merge(judgement.curves, spec, curve, contender.name)
             else:
                 judgement.checks += self._pairs.checks(spec, contenders, self._contenders)
+        judgement.checks = attributed(judgement.checks)
         explainer = Explainer(self._case, self._results, self._truth, self._measured)
         found = (explainer.explain(c, judgement.checks) for c in self._contenders)
         judgement.diagnoses = [diagnosis for diagnosis in found if diagnosis is not None]

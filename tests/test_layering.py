@@ -33,7 +33,7 @@ LAYERS = (
     ("measure",),
     ("diagnosis",),
     ("chart",),
-    ("verdict", "preflight"),
+    ("verdict", "preflight", "attribution"),
     ("report",),
     ("plan", "results", "pairs", "explain", "judge", "packing", "archive", "lanes", "run"),
     ("doctor",),

@@ -21,7 +21,10 @@ from harness.expected import Float
 
 # Rays that a wrong renderer's own edges may have spoilt: those of the truth are left out already.
 TRIMMED = 0.05
-MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 12, 8, 2
+MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 12, 5, 2
+# Steps of the right hypothesis gain most of what is left; one that gains less than this share of
+# its cost by a step is not the one.
+CRAWL = 0.02
 LARGEST = 1e15  # of a misfit, so that squares stay finite
 
 
@@ -106,7 +109,11 @@ def fit(hypothesis: Hypothesis, evidence: Sequence[Evidence]) -> Fit | None:
     if not hypothesis.size or not hypothesis.continuous:
         point, values = tried[0]
         return _result(hypothesis, point, values, np.zeros((hypothesis.size, hypothesis.size)))
-    found = [_descend(at, point, start) for point, start in tried[:STARTS_TRIED]]
+    found = []
+    for point, start in tried[:STARTS_TRIED]:
+        found.append(_descend(at, point, start))
+        if max(found[-1][0].squares) <= 1:
+            break  # within all tolerances: nothing is better
     point, values, curvature = min(found, key=lambda f: f[0].score)
     return _result(hypothesis, point, values, curvature)
 
@@ -133,7 +140,7 @@ def _descend(at: At, point: _Point, values: Values) -> tuple[_Point, Values, Flo
             break
         gained = point.score - better[0].score
         point, values = better
-        if gained < 1e-3:
+        if gained < max(1e-3, CRAWL * point.score):
             break
     return point, values, curvature
 
