@@ -107,6 +107,8 @@ def _witnesses(
     }
     files: set[str] = set()
     for case in cases:
+        if any(isinstance(surface.material, ThinSlab) for surface in case.scene.surfaces):
+            continue  # what a renderer does there need not be what it does at solids
         if case.loaded.id in right and case.loaded.case not in files and case.loaded.model.probes:
             files.add(case.loaded.case)
             if len(files) > MOST_WITNESSES:

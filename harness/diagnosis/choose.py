@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.diagnosis.evidence import Evidence
-from harness.diagnosis.fit import Fit, fit, truth_fit
+from harness.diagnosis.fit import TRIMMED, Fit, fit, truth_fit
 from harness.diagnosis.hypothesis import Fitted, Hypothesis
 from harness.diagnosis.library import LIBRARY
 from harness.record import Cause, CauseFit, Diagnosis
@@ -35,11 +35,11 @@ def complexity(hypothesis: Hypothesis, rays: int) -> float:
     return hypothesis.size / 2 * float(np.log(max(rays, 2))) + ORDER * LIBRARY.index(hypothesis)
 
 
-def rank(evidence: Sequence[Evidence]) -> list[Ranked]:
+def rank(evidence: Sequence[Evidence], trimmed: float) -> list[Ranked]:
     """All hypotheses that say something about the evidence, the best first."""
     ranked = []
     for hypothesis in LIBRARY:
-        found = fit(hypothesis, evidence)
+        found = fit(hypothesis, evidence, trimmed)
         if found is not None:
             cost = found.score + complexity(hypothesis, sum(found.rays))
             cost += min(hypothesis.prior(piece.setting) for piece in evidence)
@@ -49,10 +49,14 @@ def rank(evidence: Sequence[Evidence]) -> list[Ranked]:
 
 def diagnose(renderer: str, evidence: Sequence[Evidence]) -> Diagnosis | None:
     """The diagnosis of one case; None where the evidence shows no deviation."""
-    truth = truth_fit(evidence)
-    if not evidence or max(truth.squares) <= 1:
+    if not evidence:
         return None
-    ranked = rank(evidence)
+    truth, trimmed = truth_fit(evidence), TRIMMED
+    if max(truth.squares) <= 1:  # then only a few rays are off, if any
+        truth, trimmed = truth_fit(evidence, 0.0), 0.0
+    if max(truth.squares) <= 1:
+        return None
+    ranked = rank(evidence, trimmed)
     deviation = float(np.sqrt(np.average(truth.squares, weights=truth.rays)))
     iors = indices(evidence)
     best, second = ranked[0], next(r for r in ranked if not akin(r, ranked[0]))

@@ -72,16 +72,18 @@ def landings(
     truth: ProbeTruth, rays: RayMeasurement, precision: Precision, thin: bool
 ) -> Landings | None:
     """None where no ray says anything."""
-    point_tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
-    direction_tolerance = rays.direction_uncertainty + truth.direction_tolerance(precision)
+    # Of a ray that is not seen the image's uncertainty is not known, nor needed.
+    point_tolerance = np.nan_to_num(rays.point_uncertainty) + truth.point_tolerance(precision)
+    direction_tolerance = np.nan_to_num(rays.direction_uncertainty) + (
+        truth.direction_tolerance(precision)
+    )
     usable = ~truth.grazing & ~rays.undecided & ~rays.faint & ~rays.mixed & _known(truth)
     error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1) / point_tolerance
     if rays.direction is not None:
         turned = np.linalg.norm(rays.direction - truth.paths.direction, axis=1)
         error = np.fmax(error, turned / direction_tolerance)
-    rows = _chosen(truth, usable, np.nan_to_num(error, nan=-1.0))
-    # What a wrong renderer measures may be less exact than truth would be there: what is not a
-    # number says nothing.
+    lost = usable & ~rays.seen & (truth.paths.status == Status.HIT)
+    rows = _chosen(truth, usable, np.where(lost, np.inf, np.nan_to_num(error, nan=-1.0)))
     exact = np.isfinite(point_tolerance[rows]) & np.isfinite(direction_tolerance[rows])
     rows = rows[exact]
     if not len(rows):

@@ -65,12 +65,14 @@ class _Point:
 At = Callable[[Values], _Point]
 
 
-def _point(worlds: Sequence[World], evidence: Sequence[Evidence]) -> _Point:
+def _point(
+    worlds: Sequence[World], evidence: Sequence[Evidence], trimmed: float = TRIMMED
+) -> _Point:
     gaps, squares, rays = [], [], []
     for world, piece in zip(worlds, evidence, strict=True):
         gap = np.clip(np.nan_to_num(misfit(world, piece), nan=LARGEST), -LARGEST, LARGEST)
         each = np.sort((gap**2).mean(axis=1))
-        kept = max(1, int(np.ceil(len(each) * (1 - TRIMMED))))
+        kept = max(1, int(np.ceil(len(each) * (1 - trimmed))))
         gaps.append(gap)
         squares.append(float(each[:kept].mean()))
         rays.append(len(each))
@@ -83,15 +85,18 @@ def cost_of(worlds: Sequence[World], evidence: Sequence[Evidence]) -> float:
     return _point(worlds, evidence).score
 
 
-def truth_fit(evidence: Sequence[Evidence]) -> _Point:
+def truth_fit(evidence: Sequence[Evidence], trimmed: float = TRIMMED) -> _Point:
     """How well the right world explains the evidence."""
-    return _point([World.right(piece.setting) for piece in evidence], evidence)
+    return _point([World.right(piece.setting) for piece in evidence], evidence, trimmed)
 
 
-def fit(hypothesis: Hypothesis, evidence: Sequence[Evidence]) -> Fit | None:
+def fit(
+    hypothesis: Hypothesis, evidence: Sequence[Evidence], trimmed: float = TRIMMED
+) -> Fit | None:
     """The best parameters by Gauss and Newton from the most promising starts.
 
-    None where the hypothesis says nothing about any of the evidence.
+    `trimmed` is the share of rays that may be anything. None where the hypothesis says nothing
+    about any of the evidence.
     """
     right = [World.right(piece.setting) for piece in evidence]
     concerned = [hypothesis.applies(world) for world in right]
@@ -103,7 +108,7 @@ def fit(hypothesis: Hypothesis, evidence: Sequence[Evidence]) -> Fit | None:
             hypothesis.world(world, values) if mine else world
             for world, mine in zip(right, concerned, strict=True)
         ]
-        return _point(worlds, evidence)
+        return _point(worlds, evidence, trimmed)
 
     tried = sorted(((at(start), start) for start in hypothesis.starts), key=lambda t: t[0].score)
     if not hypothesis.size or not hypothesis.continuous:
