@@ -7,16 +7,14 @@ read nothing else.
 from __future__ import annotations
 
 import enum
-import os
-import tempfile
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
-from harness.errors import InputError
-
-Document = TypeVar("Document", bound="BaseModel")
+from harness.documents import Model, read
+from harness.documents import write_bytes as write_bytes  # for those who write beside records
+from harness.documents import write_text as write_text
 
 RECORD_SCHEMA: Literal["snellcheck-record/1"] = "snellcheck-record/1"
 SUMMARY_SCHEMA: Literal["snellcheck-summary/1"] = "snellcheck-summary/1"
@@ -41,8 +39,45 @@ def worst(verdicts: list[Verdict]) -> Verdict:
     return min(verdicts, key=SEVERITY.index, default=Verdict.ERROR)
 
 
-class Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
+class BaselineState(enum.StrEnum):
+    """How a check of a run stands to the approved result. Only the first five are harmless."""
+
+    SAME = "same"
+    DRIFTED = "drifted"  # moved, and still within tolerance
+    IMPROVED = "improved"
+    NEW = "new"  # nothing was approved yet
+    RENDERER_CHANGED = "renderer-changed"  # another version, the same numbers
+    REGRESSED = "regressed"
+    MISSING = "missing"  # approved, and not measured now
+    STALE = "stale"  # approved for another scene or other settings, so not comparable
+
+
+class AgainstBaseline(Model):
+    """What was approved for a check, and how the present result stands to it.
+
+    `shift` is the change of the deviation from truth in tolerances, None where there is none.
+    """
+
+    state: BaselineState
+    reason: str = ""
+    value: float | None = None
+    expected: float | None = None
+    tolerance: float | None = None
+    status: Verdict | None = None
+    shift: float | None = None
+    version: str = ""  # of the renderer when it was approved
+    approved: str = ""  # when, by whom and why
+
+
+class Stored(Model):
+    """Says of a renderer that its results were not measured now but stored when approved."""
+
+    version: str
+    approved: str  # ISO 8601, UTC
+    by: str
+    reason: str
+    sha256: str  # of the baseline's file
+    file: str
 
 
 class Check(Model):
@@ -65,13 +100,16 @@ class Check(Model):
     reason: str
     derivation: str = ""
     detail: dict[str, float | int | str] = Field(default_factory=dict)
+    stored: list[str] = Field(default_factory=list)  # renderers whose side was not rendered now
+    baseline: AgainstBaseline | None = None
 
 
 class ImageFile(Model):
     """A stored image; all paths are relative to the run's folder. `role` is "image", "probe", …
 
     `path` is the linear data (EXR); `picture` is the same at full size as a browser can show it,
-    `thumbnail` a smaller one.
+    `thumbnail` a smaller one. `mean` is of each channel over the picture; `mean_error` is its
+    standard error where the renderer samples.
     """
 
     role: str
@@ -81,6 +119,8 @@ class ImageFile(Model):
     sha256: str
     width: int
     height: int
+    mean: list[float] = Field(default_factory=list)
+    mean_error: list[float] = Field(default_factory=list)
 
 
 class DifferenceMap(Model):
@@ -107,6 +147,9 @@ class RendererRun(Model):
     settings: dict[str, float | int | str] = Field(default_factory=dict)
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: emitted scene …
     images: list[ImageFile] = Field(default_factory=list)
+    capabilities: list[str] = Field(default_factory=list)
+    facts: dict[str, float | int | str] = Field(default_factory=dict)  # of its preflight
+    stored: Stored | None = None
 
 
 class Series(Model):
@@ -156,7 +199,10 @@ class CaseRecord(Model):
     formula: str = ""
     parameters: dict[str, float | int | str] = Field(default_factory=dict)
     scene_sha256: str
+    scene_fingerprint: str = ""  # the same on all machines: see harness.scene.fingerprint
     scene_file: str
+    scene_path: str = ""  # as it was found, from the working folder where it is below it
+    platform: str = ""
     quality: str
     snellcheck_version: str
     started: str  # ISO 8601, UTC
@@ -176,7 +222,7 @@ class CaseRecord(Model):
 
 class RendererSummary(Model):
     version: str
-    status: str  # "ok", "missing", "failed preflight", "failed"
+    status: str  # "ok", "stored" in place of a missing one, "missing", "failed preflight", "failed"
     cases: int
     render_s: float
     reason: str = ""
@@ -201,6 +247,37 @@ class SummaryCase(Model):
     checks: list[Check]
 
 
+class LostCheck(Model):
+    """A check that was approved and is not in the run, or whose baseline cannot be read."""
+
+    case: str
+    renderer: str
+    check: str = ""
+    state: BaselineState
+    reason: str
+
+
+class Trend(Model):
+    """A check that moves in one direction from run to run; `slope` is in tolerances per run."""
+
+    case: str
+    check: str
+    runs: int
+    slope: float
+    p_value: float
+    reason: str
+
+
+class BaselineSummary(Model):
+    """The outcome of `snellcheck check`: against what, how many in which state, what is lost."""
+
+    source: str
+    failed: bool
+    counts: dict[str, int]
+    lost: list[LostCheck] = Field(default_factory=list)
+    trends: list[Trend] = Field(default_factory=list)
+
+
 class Summary(Model):
     """`summary.json`. `counts` counts checks."""
 
@@ -214,29 +291,11 @@ class Summary(Model):
     renderers: dict[str, RendererSummary]
     counts: Counts
     cases: list[SummaryCase]
+    baseline: BaselineSummary | None = None
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"
     )
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Writes all of `data` or nothing: to a temporary name beside `path`, then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(name).chmod(0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes `text` as UTF-8, all of it or nothing."""
-    write_bytes(path, text.encode("utf-8"))
 
 
 def write(document: CaseRecord | Summary, path: Path) -> None:
@@ -244,22 +303,11 @@ def write(document: CaseRecord | Summary, path: Path) -> None:
     write_text(path, document.model_dump_json(by_alias=True, indent=1) + "\n")
 
 
-def _read(path: Path, kind: type[Document]) -> Document:
-    try:
-        return kind.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise InputError.of(f"cannot be read: {error.strerror}", file=path) from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise InputError.of(f"not a valid record: {first['msg']}", file=path, key=key) from error
-
-
 def read_case(path: Path) -> CaseRecord:
     """Raises InputError where `path` is unreadable or not a record of this version."""
-    return _read(path, CaseRecord)
+    return read(path, CaseRecord)
 
 
 def read_summary(path: Path) -> Summary:
     """Raises InputError where `path` is unreadable or not a summary of this version."""
-    return _read(path, Summary)
+    return read(path, Summary)

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores"),
+    ("errors", "data", "cores", "documents"),
     ("record", "imagefile", "expected", "measure.observables"),
     ("scene",),
     ("renderers.base",),
@@ -34,7 +34,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight"),
     ("report",),
-    ("plan", "results", "pairs", "judge", "archive", "lanes", "run"),
+    ("baseline", "plan", "results", "pairs", "judge", "archive", "lanes", "run"),
     ("doctor",),
     ("show", "cli"),
 )
