@@ -26,7 +26,7 @@ LAYERS = (
     ("record", "imagefile", "expected", "measure.observables"),
     ("scene",),
     ("renderers.base",),
-    ("camera", "chord", "translate"),
+    ("camera", "chord", "section", "translate"),
     ("truth",),
     ("renderers",),
     ("probe",),
@@ -34,7 +34,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight"),
     ("report",),
-    ("baseline", "plan", "results", "pairs", "judge", "archive", "lanes", "run"),
+    ("baseline", "plan", "results", "pairs", "judge", "packing", "archive", "lanes", "run"),
     ("doctor",),
     ("show", "cli"),
 )
