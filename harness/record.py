@@ -6,7 +6,6 @@ read nothing else.
 
 from __future__ import annotations
 
-import enum
 from pathlib import Path
 from typing import Literal
 
@@ -15,69 +14,31 @@ from pydantic import ConfigDict, Field
 from harness.documents import Model, read
 from harness.documents import write_bytes as write_bytes  # for those who write beside records
 from harness.documents import write_text as write_text
+from harness.outcomes import SEVERITY as SEVERITY
+from harness.outcomes import AgainstBaseline as AgainstBaseline
+from harness.outcomes import BaselineState as BaselineState
+from harness.outcomes import BaselineSummary as BaselineSummary
+from harness.outcomes import LostCheck as LostCheck
+from harness.outcomes import Stored as Stored
+from harness.outcomes import Trend as Trend
+from harness.outcomes import Verdict as Verdict
+from harness.outcomes import worst as worst
 
 RECORD_SCHEMA: Literal["snellcheck-record/1"] = "snellcheck-record/1"
 SUMMARY_SCHEMA: Literal["snellcheck-summary/1"] = "snellcheck-summary/1"
 
 
-class Verdict(enum.StrEnum):
-    """PASS and KNOWN are green; KNOWN is a deviation of the size that the scene documents."""
+class Attribution(Model):
+    """Who is off, where a check compares two renderers or one with the truth.
 
-    PASS = "pass"
-    FAIL = "fail"
-    SKIP = "skip"
-    ERROR = "error"
-    KNOWN = "known"
-
-
-# The order in which verdicts of parts decide the verdict of the whole, worst first.
-SEVERITY = (Verdict.ERROR, Verdict.FAIL, Verdict.SKIP, Verdict.KNOWN, Verdict.PASS)
-
-
-def worst(verdicts: list[Verdict]) -> Verdict:
-    """The verdict of a whole; nothing at all is an ERROR, because it shows nothing."""
-    return min(verdicts, key=SEVERITY.index, default=Verdict.ERROR)
-
-
-class BaselineState(enum.StrEnum):
-    """How a check of a run stands to the approved result. Only the first five are harmless."""
-
-    SAME = "same"
-    DRIFTED = "drifted"  # moved, and still within tolerance
-    IMPROVED = "improved"
-    NEW = "new"  # nothing was approved yet
-    RENDERER_CHANGED = "renderer-changed"  # another version, the same numbers
-    REGRESSED = "regressed"
-    MISSING = "missing"  # approved, and not measured now
-    STALE = "stale"  # approved for another scene or other settings, so not comparable
-
-
-class AgainstBaseline(Model):
-    """What was approved for a check, and how the present result stands to it.
-
-    `shift` is the change of the deviation from truth in tolerances, None where there is none.
+    `how` is "truth" where a closed form decides, "agreement" where the renderers' majority does, or
+    "undecided"; `confidence` is the probability that `off` are those who are wrong.
     """
 
-    state: BaselineState
-    reason: str = ""
-    value: float | None = None
-    expected: float | None = None
-    tolerance: float | None = None
-    status: Verdict | None = None
-    shift: float | None = None
-    version: str = ""  # of the renderer when it was approved
-    approved: str = ""  # when, by whom and why
-
-
-class Stored(Model):
-    """Says of a renderer that its results were not measured now but stored when approved."""
-
-    version: str
-    approved: str  # ISO 8601, UTC
-    by: str
-    reason: str
-    sha256: str  # of the baseline's file
-    file: str
+    off: list[str]
+    how: str
+    confidence: float
+    sentence: str
 
 
 class Check(Model):
@@ -102,6 +63,58 @@ class Check(Model):
     detail: dict[str, float | int | str] = Field(default_factory=dict)
     stored: list[str] = Field(default_factory=list)  # renderers whose side was not rendered now
     baseline: AgainstBaseline | None = None
+    attribution: Attribution | None = None
+
+
+class Cause(Model):
+    """A known cause with its fitted parameter: what the renderer does, as `sentence` says.
+
+    `residual` is what it leaves of the deviation (root mean square, in units of the tolerances; 1
+    is perfect), `explains` the share of the deviation that it takes away.
+    """
+
+    id: str
+    sentence: str
+    parameter: str = ""
+    value: float | None = None
+    uncertainty: float | None = None  # two standard errors
+    unit: str = ""
+    residual: float
+    explains: float
+
+
+class CauseFit(Model):
+    """How well one cause fits one case, from which the cause of a whole run is computed.
+
+    `score` is its cost (see `harness.diagnosis.fit`), which grows by `information` / 2 times the
+    square of a change of the first of `values`. The one without an id is the truth's.
+    """
+
+    id: str
+    values: list[float]
+    score: float
+    information: float
+    fits: bool
+
+
+class Diagnosis(Model):
+    """Why a renderer is off, in one case or, with `cases`, in all of a run.
+
+    `cause` is None where none of the known causes fits, and `sentence` says so. `deviation` is the
+    size of what is to be explained, in units of the tolerances, `rays` how many rays tell of it.
+    `cases` are those that the cause explains, `unexplained` those that it does not.
+    """
+
+    renderer: str
+    sentence: str
+    cause: Cause | None = None
+    runner_up: Cause | None = None
+    deviation: float = 0.0
+    rays: int = 0
+    iors: list[float] = Field(default_factory=list)
+    fits: list[CauseFit] = Field(default_factory=list)
+    cases: list[str] = Field(default_factory=list)
+    unexplained: list[str] = Field(default_factory=list)
 
 
 class ImageFile(Model):
@@ -227,6 +240,7 @@ class CaseRecord(Model):
     differences: list[DifferenceMap] = Field(default_factory=list)
     tables: list[Table] = Field(default_factory=list)
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: scene.json …
+    diagnoses: list[Diagnosis] = Field(default_factory=list)  # of renderers that are off here
     pack: str | None = None  # relative path: pixels and rays as numbers, for the report's pages
 
     model_config = ConfigDict(
@@ -259,37 +273,7 @@ class SummaryCase(Model):
     family: str
     status: Verdict
     checks: list[Check]
-
-
-class LostCheck(Model):
-    """A check that was approved and is not in the run, or whose baseline cannot be read."""
-
-    case: str
-    renderer: str
-    check: str = ""
-    state: BaselineState
-    reason: str
-
-
-class Trend(Model):
-    """A check that moves in one direction from run to run; `slope` is in tolerances per run."""
-
-    case: str
-    check: str
-    runs: int
-    slope: float
-    p_value: float
-    reason: str
-
-
-class BaselineSummary(Model):
-    """The outcome of `snellcheck check`: against what, how many in which state, what is lost."""
-
-    source: str
-    failed: bool
-    counts: dict[str, int]
-    lost: list[LostCheck] = Field(default_factory=list)
-    trends: list[Trend] = Field(default_factory=list)
+    diagnoses: list[Diagnosis] = Field(default_factory=list)
 
 
 class Summary(Model):
@@ -306,6 +290,7 @@ class Summary(Model):
     counts: Counts
     cases: list[SummaryCase]
     baseline: BaselineSummary | None = None
+    diagnoses: list[Diagnosis] = Field(default_factory=list)  # one per renderer that is off
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"

@@ -13,6 +13,7 @@ from harness import __version__, plan, record
 from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.errors import InputError
+from harness.explain import explain_run
 from harness.judge import CaseJudge
 from harness.lanes import Calibrated, Done, Event, Lane
 from harness.pairs import camera_shift
@@ -189,8 +190,9 @@ class _Session:
             quality=self.quality, started=self.started, wall_s=time.perf_counter() - state.started,
         )  # fmt: skip
         self.finished[index] = SummaryCase(
-            id=written.id, family=written.family, status=written.status, checks=written.checks
-        )
+            id=written.id, family=written.family, status=written.status, checks=written.checks,
+            diagnoses=written.diagnoses,
+        )  # fmt: skip
         state.results.clear()
 
     def _or_stand_in(self, contender: Contender, state: _CaseState) -> Contender:
@@ -228,6 +230,7 @@ class _Session:
             renderers={name: self._renderer_summary(name) for name in self.names},
             counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
             cases=cases,
+            diagnoses=explain_run([state.case for state in self.states], cases, self.names),
         )
 
     def _renderer_summary(self, name: str) -> RendererSummary:
