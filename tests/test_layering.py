@@ -37,8 +37,8 @@ LAYERS = (
     ("report",),
     ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
     ("lanes", "run"),
-    ("doctor",),
-    ("show", "cli"),
+    ("doctor", "ci"),
+    ("show", "cli", "pytest_plugin"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 
