@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import queue
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
 from harness import __version__, plan, record
 from harness.archive import Archive
+from harness.baseline.stand_in import StandIns
 from harness.errors import InputError
+from harness.explain import explain_run
 from harness.judge import CaseJudge
 from harness.lanes import Calibrated, Done, Event, Lane
 from harness.pairs import camera_shift
@@ -53,12 +55,16 @@ def run(
     threads: int = 2,
     seed: int = 0,
     command: str = "",
+    stand_ins: StandIns | None = None,
+    must_run: Collection[str] = (),
     report: Callable[[Progress], None] = lambda _: None,
 ) -> Summary:
     """Runs everything, writes records, pictures and `summary.json` below `out`.
 
-    `helper` makes auxiliary pictures and need not be among `renderers`. Returns the summary, whose
-    `exit_code` is that of the command. Raises InputError where there is nothing to run.
+    `helper` makes auxiliary pictures and need not be among `renderers`. `stand_ins` are stored
+    results for renderers that are missing; those in `must_run` count as missing all the same.
+    Returns the summary, whose `exit_code` is that of the command. Raises InputError where there is
+    nothing to run.
     """
     if not cases:
         raise InputError.of("no case to run")
@@ -70,6 +76,7 @@ def run(
             raise InputError.of("two renderers of one name", key="--renderer", value=name)
     settings = RenderSettings(samples=SAMPLES[quality], seed=seed, threads=threads)
     session = _Session(cases, renderers, helper, Archive(out), settings, quality, report)
+    session.stand_ins, session.must_run = stand_ins, must_run
     try:
         session.work()
     finally:
@@ -97,6 +104,9 @@ class _Session:
         self.names = [r.name for r in renderers]
         self.archive, self.settings, self.quality, self.report = archive, settings, quality, report
         self.helper = helper.name
+        self.stand_ins: StandIns | None = None
+        self.must_run: Collection[str] = ()
+        self.stood_in: dict[str, list[Contender]] = {name: [] for name in self.names}
         everyone = {r.name: r for r in (*renderers, helper)}
         self.lanes = {name: Lane(r, settings, self.events) for name, r in everyone.items()}
         self.contenders: dict[str, Contender] = {}
@@ -171,7 +181,7 @@ class _Session:
             self._judge(index, state)
 
     def _judge(self, index: int, state: _CaseState) -> None:
-        contenders = [self.contenders[name] for name in self.names]
+        contenders = [self._or_stand_in(self.contenders[name], state) for name in self.names]
         film = state.case.scene.film
         results = Results(state.results, film.width, film.height)
         judgement = CaseJudge(state.case, contenders, results, self.helper).judge()
@@ -180,9 +190,25 @@ class _Session:
             quality=self.quality, started=self.started, wall_s=time.perf_counter() - state.started,
         )  # fmt: skip
         self.finished[index] = SummaryCase(
-            id=written.id, family=written.family, status=written.status, checks=written.checks
-        )
+            id=written.id, family=written.family, status=written.status, checks=written.checks,
+            diagnoses=written.diagnoses,
+        )  # fmt: skip
         state.results.clear()
+
+    def _or_stand_in(self, contender: Contender, state: _CaseState) -> Contender:
+        """The contender, or what is stored of it where it is missing; stored pictures are added."""
+        if contender.absent is not Verdict.SKIP or self.stand_ins is None:
+            return contender
+        stood, images = self.stand_ins.stand_in(contender, state.case, self.settings)
+        for role, image in images.items():
+            state.results[contender.name, role] = image
+        self.stood_in[contender.name].append(stood)
+        return stood
+
+    def _stood_in(self, name: str) -> bool:
+        """Whether stored results stood in for a missing renderer in every case."""
+        stood = self.stood_in[name]
+        return bool(stood) and all(contender.stored is not None for contender in stood)
 
     def summary(self, command: str) -> Summary:
         cases = [case for case in self.finished if case is not None]
@@ -193,16 +219,27 @@ class _Session:
             wall_s=time.perf_counter() - self.began,
             quality=self.quality,
             command=command,
-            exit_code=exit_code(cases, [self.contenders[name] for name in self.names]),
+            exit_code=exit_code(
+                cases,
+                [
+                    self.contenders[name]
+                    for name in self.names
+                    if name in self.must_run or not self._stood_in(name)
+                ],
+            ),
             renderers={name: self._renderer_summary(name) for name in self.names},
             counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
             cases=cases,
+            diagnoses=explain_run([state.case for state in self.states], cases, self.names),
         )
 
     def _renderer_summary(self, name: str) -> RendererSummary:
         contender = self.contenders[name]
         status = "ok"
-        if contender.absent is Verdict.SKIP:
+        stored = [stood for stood in self.stood_in[name] if stood.stored is not None]
+        if stored:
+            status, contender = "stored", stored[0]
+        elif contender.absent is Verdict.SKIP:
             status = "missing"
         elif contender.absent is not None:
             status = "failed preflight" if "preflight" in contender.reason else "failed"

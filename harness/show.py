@@ -58,7 +58,8 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
     table = Table(title="Verdicts: checks passed of checks made", title_justify="left")
     table.add_column("family")
     for name in names:
-        table.add_column(name, justify="right")
+        stored = " (stored)" if summary.renderers[name].status == "stored" else ""
+        table.add_column(escape(name + stored), justify="right")
     by_family: dict[str, list[Check]] = {}
     for case in summary.cases:
         by_family.setdefault(case.family, []).extend(case.checks)
@@ -73,6 +74,8 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
             if renderer.remedy:
                 console.print(f"  mend it with: [bold]{escape(renderer.remedy)}[/]")
     _problems(summary, console)
+    for diagnosis in summary.diagnoses:
+        console.print(f"[bold]Diagnosis[/] {escape(diagnosis.sentence)}")
     counts = Counter(c.status for case in summary.cases for c in case.checks)
     said = ", ".join(f"[{STYLE[v]}]{counts[v]} {v.value}[/]" for v in Verdict)
     console.print(f"{sum(counts.values())} checks in {summary.wall_s:.1f} s: {said}")

@@ -27,6 +27,12 @@ from harness.cli.options import (
 @config_option
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 256), help="Cores to use.  [default: all]")
+@click.option(
+    "--stored/--no-stored",
+    default=True,
+    show_default=True,
+    help="Let approved results stand in for renderers that are missing.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @quality_option
 @scenes_option
@@ -38,6 +44,7 @@ def command(
     configs: tuple[Path, ...],
     out: Path,
     jobs: int | None,
+    stored: bool,
     seed: int,
     quality: str,
     scenes: Path | None,
@@ -47,6 +54,8 @@ def command(
     Writes OUT/records/*.json, OUT/summary.json and OUT/index.html.
     """
     from harness import show
+    from harness.baseline.stand_in import StandIns
+    from harness.cli.baselines import stand_in_sources
     from harness.cores import core_count
     from harness.renderers import registry
     from harness.report import write_report
@@ -60,7 +69,8 @@ def command(
     with show.progress() as progress:
         summary = run_cases(
             cases, chosen, helper, out, quality=quality, threads=jobs or core_count(), seed=seed,
-            command=line, report=progress,
+            command=line, report=progress, must_run=renderers,
+            stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
         )  # fmt: skip
     index = write_report(out)
     show.verdicts(summary, index)
