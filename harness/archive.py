@@ -56,6 +56,7 @@ class Archive:
     ) -> CaseRecord:
         """Writes the images of a case, its scene and its record; returns the record."""
         loaded, name = case.loaded, folder_name(case.loaded.id)
+        self.discard(name)
         scene_json = case.scene.model_dump_json()
         record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
         runs = [self._run(case, c, name, results, judgement, seconds, settings) for c in contenders]
@@ -85,6 +86,19 @@ class Archive:
         )
         record.write(written, self.root / "records" / f"{name}.json")
         return written
+
+    def discard(self, name: str) -> None:
+        """Removes what an earlier run left of a case, its record first: no record, no case."""
+        (self.root / "records" / f"{name}.json").unlink(missing_ok=True)
+        for path in self.files(name):
+            (self.root / path).unlink(missing_ok=True)
+
+    def files(self, name: str) -> list[str]:
+        """The paths of all that belongs to a case, its record last, relative to the folder."""
+        scene, record_file = f"scenes/{name}.json", f"records/{name}.json"
+        images = sorted((self.root / "images" / name).rglob("*"))
+        inside = [path.relative_to(self.root).as_posix() for path in images if path.is_file()]
+        return [path for path in (scene, *inside, record_file) if (self.root / path).is_file()]
 
     def _run(
         self,

@@ -22,8 +22,9 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores"),
+    ("errors", "data", "cores", "fingerprint"),
     ("record", "imagefile", "expected", "measure.observables"),
+    ("cache",),
     ("scene",),
     ("renderers.base",),
     ("camera", "chord", "translate"),
@@ -34,7 +35,8 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight"),
     ("report",),
-    ("plan", "results", "pairs", "judge", "archive", "lanes", "run"),
+    ("plan", "results", "pairs", "judge", "archive"),
+    ("parcel", "memo", "bundle", "lanes", "session", "run"),
     ("doctor",),
     ("show", "cli"),
 )
