@@ -7,7 +7,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
@@ -34,6 +34,18 @@ def folder_name(case_id: str) -> str:
     """A file name for a case: letters, digits and ``._-`` only, and unique."""
     plain = "".join(c if c.isalnum() or c in "._-" else "_" for c in case_id)[:80]
     return f"{plain}-{hashlib.sha256(case_id.encode()).hexdigest()[:8]}"
+
+
+def belongs(path: str, name: str) -> bool:
+    """Whether a path relative to a run's folder is of the case whose `folder_name` is `name`.
+
+    All that is written for a case is ``FOLDER/NAME.…`` or ``FOLDER/NAME/…``; the report's pages in
+    ``cases/`` are made anew from that.
+    """
+    parts = PurePosixPath(path).parts
+    if len(parts) < 2 or parts[0] in ("/", "cases") or ".." in parts:
+        return False
+    return parts[1].startswith(f"{name}.") if len(parts) == 2 else parts[1] == name
 
 
 class Archive:
@@ -99,12 +111,19 @@ class Archive:
         for path in self.files(name):
             (self.root / path).unlink(missing_ok=True)
 
+    def sweep(self) -> None:
+        """Removes files that a run was writing when it was killed."""
+        for folder in ("assets", "cases", "data", "images", "records", "scenes"):
+            for path in (self.root / folder).rglob(".*"):
+                if record.PARTIAL.fullmatch(path.name) and path.is_file():
+                    path.unlink(missing_ok=True)
+
     def files(self, name: str) -> list[str]:
         """The paths of all that belongs to a case, its record last, relative to the folder."""
-        scene, record_file = f"scenes/{name}.json", f"records/{name}.json"
-        images = sorted((self.root / "images" / name).rglob("*"))
-        inside = [path.relative_to(self.root).as_posix() for path in images if path.is_file()]
-        return [path for path in (scene, *inside, record_file) if (self.root / path).is_file()]
+        found = [*self.root.glob(f"*/{name}.*"), *self.root.glob(f"*/{name}/**/*")]
+        paths = [path.relative_to(self.root).as_posix() for path in found if path.is_file()]
+        mine = [path for path in paths if belongs(path, name)]
+        return sorted(mine, key=lambda path: (path.startswith("records/"), path))
 
     def _run(
         self,

@@ -8,9 +8,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import PurePosixPath
 
-from harness.archive import Archive, folder_name
+from harness.archive import Archive, belongs, folder_name
 from harness.cache.cache import Cache
 from harness.errors import InputError, RendererError, RendererFailed
 from harness.fingerprint import code_digest, combined, versions
@@ -81,7 +80,7 @@ def restore(cache: Cache, key: str, archive: Archive, case: PreparedCase) -> Res
     if entry is None:
         return None
     name = folder_name(case.loaded.id)
-    wanted = {path: block for path, block in entry.blocks.items() if _belongs(path, name)}
+    wanted = {path: block for path, block in entry.blocks.items() if belongs(path, name)}
     stale = [path for path in archive.files(name) if path not in wanted]
     record_file = archive.root / "records" / f"{name}.json"
     if stale or not record_file.is_file():
@@ -94,13 +93,3 @@ def restore(cache: Cache, key: str, archive: Archive, case: PreparedCase) -> Res
         return Restored(read_case(record_file), int(entry.meta["results"]))
     except InputError:  # kept by a version whose records were others
         return None
-
-
-def _belongs(path: str, name: str) -> bool:
-    """Whether a path is one of a case's own: nothing is ever written outside the run's folder."""
-    parts = PurePosixPath(path).parts
-    if ".." in parts:
-        return False
-    return parts in {("scenes", f"{name}.json"), ("records", f"{name}.json")} or (
-        len(parts) > 2 and parts[:2] == ("images", name)
-    )

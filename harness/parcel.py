@@ -33,7 +33,15 @@ _ERRORS: dict[str, type[RendererError]] = {
     "unsupported": RendererUnsupported,
 }
 _IMAGE: tuple[str, ...] = ("pixels", "variance", "closest")
-_PATHS: tuple[str, ...] = ("status", "surface", "point", "direction", "weight", "optical_length", "vertices")
+_PATHS: tuple[str, ...] = (
+    "status",
+    "surface",
+    "point",
+    "direction",
+    "weight",
+    "optical_length",
+    "vertices",
+)
 
 
 @dataclass(frozen=True)

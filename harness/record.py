@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import os
+import re
 import tempfile
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -247,6 +248,10 @@ class Summary(Model):
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"
     )
+
+
+# What `write_bytes` calls a file before it is whole.
+PARTIAL = re.compile(r"\..+\.[a-z0-9_]{8}")
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -62,7 +62,9 @@ def run(
     settings = RenderSettings(samples=SAMPLES[quality], seed=seed, threads=threads)
     with _alone(out):
         passing = Cache(FolderStore(out / UNFINISHED), limit=2**50)
-        storage = Storage(Archive(out), cache, passing)
+        archive = Archive(out)
+        archive.sweep()
+        storage = Storage(archive, cache, passing)
         session = Session(
             cases, renderers, helper, storage, settings, quality, report, make_executor
         )
