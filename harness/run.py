@@ -13,6 +13,7 @@ from harness.archive import Archive
 from harness.cache.cache import Cache
 from harness.cache.stores import FolderStore
 from harness.errors import InputError
+from harness.explain import explain_run
 from harness.plan import PreparedCase
 from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdict
 from harness.renderers.base import Renderer, RenderSettings
@@ -118,6 +119,7 @@ def _summary(session: Session, command: str, interrupted: bool) -> Summary:
         renderers={name: _renderer_summary(session, name) for name in session.names},
         counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
         cases=cases,
+        diagnoses=explain_run([state.case for state in session.states], cases, session.names),
         effort=session.effort.model_copy(update={"damaged": damaged}),
         interrupted=interrupted,
     )

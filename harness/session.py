@@ -249,8 +249,9 @@ class Session:
 
     def _finish(self, index: int, written: CaseRecord) -> None:
         self.finished[index] = SummaryCase(
-            id=written.id, family=written.family, status=written.status, checks=written.checks
-        )
+            id=written.id, family=written.family, status=written.status, checks=written.checks,
+            diagnoses=written.diagnoses,
+        )  # fmt: skip
 
 
 def now() -> str:
