@@ -5,6 +5,7 @@ A run in which nothing changed takes its cases from here and renders, measures a
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,11 +18,11 @@ from harness.memo import Memo
 from harness.parcel import pack_contender
 from harness.plan import PreparedCase
 from harness.record import CaseRecord, read_case, write_bytes
-from harness.renderers.base import RenderSettings
+from harness.renderers.base import Image, RenderSettings
 from harness.results import Contender, Result
 
 # What plans, judges and draws a case.
-CODE = ("harness.plan", "harness.judge", "harness.archive", "harness.report.pictures")
+CODE = ("harness.plan", "harness.judge", "harness.archive", "harness.baseline.stand_in")
 COMPUTING = ("numpy", "scipy", "scikit-image", "colour-science", "imagecodecs", "OpenEXR")
 
 
@@ -46,13 +47,28 @@ def suite_key(
     return combined(*parts, memos[helper].fingerprint) if memos[helper].lasting else None
 
 
-def case_key(case: PreparedCase, suite: str) -> str:
-    """The hash of all that determines the record of `case`."""
+def case_key(
+    case: PreparedCase,
+    suite: str,
+    stored: Sequence[Contender],
+    results: Mapping[tuple[str, str], Result],
+) -> str:
+    """The hash of all that determines the record of `case`.
+
+    `stored` are the renderers for which approved results stand in; `results` has their pictures.
+    """
     loaded = case.loaded
     named = f"{loaded.id} {loaded.file.parent.name}/{loaded.file.name}"
     parameters = json.dumps(dict(loaded.parameters))
     scene = case.scene.model_dump_json()
-    return combined("case", suite, named, parameters, loaded.model.model_dump_json(), scene)
+    parts = [named, parameters, loaded.model.model_dump_json(), scene]
+    for contender in stored:
+        checks = {name: c.model_dump_json() for name, c in contender.stored_checks.items()}
+        parts += [json.dumps(pack_contender(contender)), repr(contender.stored), json.dumps(checks)]
+    for (renderer, role), result in results.items():
+        if isinstance(result, Image) and any(c.name == renderer for c in stored):
+            parts += [renderer, role, hashlib.sha256(result.pixels.tobytes()).hexdigest()]
+    return combined("case", suite, *parts)
 
 
 def keep(

@@ -28,7 +28,7 @@ from harness.renderers.base import Capability, RayPaths
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolve import expand_thin_slabs
-from harness.verdict import judge, unmeasured
+from harness.verdict import check_id, judge, unmeasured
 
 # The chance of a false alarm of one check of a sampled picture, over all of its means. A suite of
 # a hundred such checks cries wolf once in a hundred runs.
@@ -109,6 +109,8 @@ class CaseJudge:
     def _against_truth(
         self, spec: model.CheckSpec, contender: Contender
     ) -> tuple[Check, Curve | None]:
+        if contender.stored is not None:
+            return self._stored(spec, contender), None
         try:
             comparison = self._compare(spec, contender)
         except NotAvailable as gap:
@@ -116,6 +118,14 @@ class CaseJudge:
         except (Unmeasurable, ValueError) as error:
             return unmeasured(spec, contender.name, "truth", Verdict.ERROR, str(error)), None
         return judge(spec, contender.name, "truth", comparison), comparison.curve
+
+    def _stored(self, spec: model.CheckSpec, contender: Contender) -> Check:
+        """The approved result of a renderer that is not there, marked as such."""
+        check = contender.stored_checks.get(check_id(spec, contender.name, "truth"))
+        if check is None or contender.stored is None:
+            reason = f"{contender.reason}; nothing is stored for this check"
+            return unmeasured(spec, contender.name, "truth", Verdict.SKIP, reason)
+        return check.model_copy(update={"stored": [contender.name]})
 
     def _compare(self, spec: model.CheckSpec, contender: Contender) -> Comparison:
         observable, preflight = Observable(spec.observable), contender.ready()

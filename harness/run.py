@@ -5,11 +5,12 @@ from __future__ import annotations
 import contextlib
 import shutil
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
 from harness import __version__, lanes, record
 from harness.archive import Archive
+from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
 from harness.cache.stores import FolderStore
 from harness.errors import InputError
@@ -40,17 +41,20 @@ def run(
     threads: int = 2,
     seed: int = 0,
     command: str = "",
+    stand_ins: StandIns | None = None,
+    must_run: Collection[str] = (),
     report: Callable[[Progress], None] = lambda _: None,
     cache: Cache | None = None,
     make_executor: lanes.MakeExecutor = lanes.threads,
 ) -> Summary:
     """Runs everything, writes records, pictures and `summary.json` below `out`.
 
-    `helper` makes auxiliary pictures and need not be among `renderers`. What `cache` holds is not
-    done again; nor is what an earlier run into `out` had done when it was killed. Returns the
-    summary, whose `exit_code` is that of the command; after Ctrl-C it holds what was judged so far,
-    and says so. Raises InputError where there is nothing to run or another run writes to `out`,
-    OSError where the disk is full.
+    `helper` makes auxiliary pictures and need not be among `renderers`. `stand_ins` are stored
+    results for renderers that are missing; those in `must_run` count as missing all the same. What
+    `cache` holds is not done again; nor is what an earlier run into `out` had done when it was
+    killed. Returns the summary, whose `exit_code` is that of the command; after Ctrl-C it holds
+    what was judged so far, and says so. Raises InputError where there is nothing to run or another
+    run writes to `out`, OSError where the disk is full.
     """
     if not cases:
         raise InputError.of("no case to run")
@@ -67,7 +71,7 @@ def run(
         archive.sweep()
         storage = Storage(archive, cache, passing)
         session = Session(
-            cases, renderers, helper, storage, settings, quality, report, make_executor
+            cases, renderers, helper, storage, settings, quality, report, stand_ins, make_executor
         )
         interrupted = False
         (out / "summary.json").unlink(missing_ok=True)  # an old one would belie what is there now
@@ -78,7 +82,7 @@ def run(
             session.give_up("the run was interrupted before this was judged")
         finally:
             session.close()
-        summary = _summary(session, command, interrupted)
+        summary = _summary(session, command, must_run, interrupted)
         record.write(summary, out / "summary.json")
         if not interrupted:
             shutil.rmtree(out / UNFINISHED, ignore_errors=True)
@@ -103,10 +107,16 @@ def _alone(out: Path) -> Iterator[None]:
         yield
 
 
-def _summary(session: Session, command: str, interrupted: bool) -> Summary:
+def _summary(
+    session: Session, command: str, must_run: Collection[str], interrupted: bool
+) -> Summary:
     cases = [case for case in session.finished if case is not None]
     verdicts = [check.status for case in cases for check in case.checks]
-    contenders = [session.contenders[n] for n in session.names if n in session.contenders]
+    contenders = [
+        session.contenders[name]
+        for name in session.names
+        if name in session.contenders and (name in must_run or not session.stood_in_for(name))
+    ]
     caches = {id(c): c for c in (session.storage.lasting, session.storage.passing) if c}
     damaged = sum(cache.damaged for cache in caches.values())
     return Summary(
@@ -131,7 +141,10 @@ def _renderer_summary(session: Session, name: str) -> RendererSummary:
         reason = "the run was interrupted before it was ready"
         return RendererSummary(version="", status="failed", cases=0, render_s=0.0, reason=reason)
     status = "ok"
-    if contender.absent is Verdict.SKIP:
+    stored = [stood for stood in session.stood_in[name] if stood.stored is not None]
+    if stored:
+        status, contender = "stored", stored[0]
+    elif contender.absent is Verdict.SKIP:
         status = "missing"
     elif contender.absent is not None:
         status = "failed preflight" if "preflight" in contender.reason else "failed"

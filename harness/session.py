@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 
 from harness import bundle, plan
 from harness.archive import Archive
+from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
 from harness.judge import CaseJudge
 from harness.lanes import Calibrated, Done, Event, Halted, Lane, MakeExecutor, Surroundings, threads
@@ -40,6 +41,7 @@ class _CaseState:
     seconds: dict[str, float] = field(default_factory=dict)
     pending: int = 0
     key: str | None = None  # under which the case is kept once it is judged
+    contenders: list[Contender] | None = None  # those of this case, stored ones among them
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Session:
         settings: RenderSettings,
         quality: str,
         report: Callable[[Progress], None],
+        stand_ins: StandIns | None = None,
         make_executor: MakeExecutor = threads,
     ) -> None:
         self.events: queue.SimpleQueue[Event] = queue.SimpleQueue()
@@ -75,7 +78,8 @@ class Session:
         self.names = [r.name for r in renderers]
         self.storage, self.settings = storage, settings
         self.quality, self.report = quality, report
-        self.helper = helper.name
+        self.helper, self.stand_ins = helper.name, stand_ins
+        self.stood_in: dict[str, list[Contender]] = {name: [] for name in self.names}
         self.running = Running()
         around = Surroundings(
             self.events, storage.lasting, storage.passing, self.running, make_executor
@@ -164,7 +168,8 @@ class Session:
         if suite is None or self.storage.lasting is None:
             return
         for index, state in enumerate(self.states):
-            state.key = bundle.case_key(state.case, suite)
+            stored = [c for c in self._contenders_of(state) if c.stored is not None]
+            state.key = bundle.case_key(state.case, suite, stored, state.results)
             if self.all_known:
                 found = bundle.restore(
                     self.storage.lasting, state.key, self.storage.archive, state.case
@@ -231,7 +236,7 @@ class Session:
             self._judge(index, state)
 
     def _judge(self, index: int, state: _CaseState) -> None:
-        contenders = [self.contenders[name] for name in self.names]
+        contenders = self._contenders_of(state)
         film = state.case.scene.film
         results = Results(state.results, film.width, film.height)
         judgement = CaseJudge(state.case, contenders, results, self.helper).judge()
@@ -246,6 +251,29 @@ class Session:
             )
         self._finish(index, written)
         state.results.clear()
+
+    def _contenders_of(self, state: _CaseState) -> list[Contender]:
+        """The renderers of a case; once all are known, for stored pictures are added to it."""
+        if state.contenders is None:
+            state.contenders = [
+                self._or_stand_in(self.contenders[name], state) for name in self.names
+            ]
+        return state.contenders
+
+    def _or_stand_in(self, contender: Contender, state: _CaseState) -> Contender:
+        """The contender, or what is stored of it where it is missing; stored pictures are added."""
+        if contender.absent is not Verdict.SKIP or self.stand_ins is None:
+            return contender
+        stood, images = self.stand_ins.stand_in(contender, state.case, self.settings)
+        for role, image in images.items():
+            state.results[contender.name, role] = image
+        self.stood_in[contender.name].append(stood)
+        return stood
+
+    def stood_in_for(self, name: str) -> bool:
+        """Whether stored results stood in for a missing renderer in every case."""
+        stood = self.stood_in[name]
+        return bool(stood) and all(contender.stored is not None for contender in stood)
 
     def _finish(self, index: int, written: CaseRecord) -> None:
         self.finished[index] = SummaryCase(

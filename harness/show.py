@@ -58,7 +58,8 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
     table = Table(title="Verdicts: checks passed of checks made", title_justify="left")
     table.add_column("family")
     for name in names:
-        table.add_column(name, justify="right")
+        stored = " (stored)" if summary.renderers[name].status == "stored" else ""
+        table.add_column(escape(name + stored), justify="right")
     by_family: dict[str, list[Check]] = {}
     for case in summary.cases:
         by_family.setdefault(case.family, []).extend(case.checks)

@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores", "fingerprint"),
+    ("errors", "data", "cores", "fingerprint", "documents", "outcomes"),
     ("record", "imagefile", "expected", "law", "measure.observables"),
     ("cache",),
     ("scene",),
@@ -36,7 +36,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight", "attribution"),
     ("report",),
-    ("plan", "results", "pairs", "explain", "judge", "packing", "archive"),
+    ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
     ("parcel", "memo", "bundle", "lanes", "session", "run"),
     ("doctor",),
     ("show", "cli"),

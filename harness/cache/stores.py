@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from harness.documents import write_bytes
 from harness.errors import InputError
-from harness.record import write_bytes
 
 ENDING = ".entry"
 STALE_S = 3600.0  # a temporary file this old belongs to nobody any more
@@ -120,7 +120,7 @@ class RemoteStore:
         except ModuleNotFoundError:
             raise InputError.of(
                 "a cache at a URL needs fsspec", key="--cache", value=url,
-                expected="pip install 'snellcheck[remote]'",
+                expected="pip install 'snellcheck[store]'",
             ) from None  # fmt: skip
         try:
             self._files, self._root = fsspec.core.url_to_fs(url)

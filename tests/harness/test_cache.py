@@ -199,7 +199,7 @@ def test_a_url_without_fsspec_names_the_command_that_installs_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "fsspec", None)
-    with pytest.raises(InputError, match=r"pip install 'snellcheck\[remote\]'"):
+    with pytest.raises(InputError, match=r"pip install 'snellcheck\[store\]'"):
         open_cache("s3://bucket/folder")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from harness import bundle, record
+from harness import bundle, documents, record
 from harness.archive import Archive, folder_name
 from harness.cache.cache import Cache, open_cache
 from harness.errors import InputError, RendererFailed
@@ -324,7 +324,7 @@ def test_a_full_disk_is_one_error_and_not_a_failure_of_every_renderer(
     def full(path: Path, data: bytes) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
-    monkeypatch.setattr(record, "write_bytes", full)
+    monkeypatch.setattr(documents, "write_bytes", full)
     with pytest.raises(OSError, match="No space left"):
         go(tmp_path / "a", None)
     assert not (tmp_path / "a" / "summary.json").exists()

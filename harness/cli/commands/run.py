@@ -28,6 +28,12 @@ from harness.cli.options import (
 @config_option
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 256), help="Cores to use.  [default: all]")
+@click.option(
+    "--stored/--no-stored",
+    default=True,
+    show_default=True,
+    help="Let approved results stand in for renderers that are missing.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @quality_option
 @scenes_option
@@ -42,6 +48,7 @@ def command(
     configs: tuple[Path, ...],
     out: Path,
     jobs: int | None,
+    stored: bool,
     seed: int,
     quality: str,
     scenes: Path | None,
@@ -58,7 +65,9 @@ def command(
     import shutil
 
     from harness import show
+    from harness.baseline.stand_in import StandIns
     from harness.cache.cache import open_cache
+    from harness.cli.baselines import stand_in_sources
     from harness.cli.interrupts import terminable
     from harness.cores import core_count
     from harness.renderers import registry
@@ -76,7 +85,8 @@ def command(
     with show.progress() as progress, terminable():
         summary = run_cases(
             cases, chosen, helper, out, quality=quality, threads=jobs or core_count(), seed=seed,
-            command=line, report=progress, cache=cache,
+            command=line, report=progress, cache=cache, must_run=renderers,
+            stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
         )  # fmt: skip
     if cache is not None and cache.trouble:
         click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)
