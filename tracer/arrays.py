@@ -27,12 +27,13 @@ from tracer.scene import (
     ThinSlab,
     Translucent,
 )
-from tracer.shapes import COLUMNS, Cell, Disk, Rectangle, Sphere, bound_row, face_row
+from tracer.shapes import COLUMNS, Disk, Rectangle, Sphere, bound_row, face_row
+from tracer.solids import Cell, Compound, compound_rows
 
 Floats = NDArray[np.float64]
 
 # Kinds of shapes, and of what they bound.
-SPHERE, CELL, MESH, RECTANGLE, DISK = range(5)
+SPHERE, CELL, COMPOUND, MESH, RECTANGLE, DISK = range(6)
 DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
 POINT, DIRECTIONAL = 0.0, 1.0
 
@@ -44,10 +45,10 @@ class Arrays(NamedTuple):
     """One row of `objects`, `balls` and `materials` per solid, then per surface."""
 
     objects: NDArray[np.int64]  # (n, 8)
-    balls: Floats  # (n, 4): centre and squared radius of a sphere around a cell
+    balls: Floats  # (n, 4): centre and squared radius of a sphere around it
     materials: Floats  # (n, 9): two colours, thickness, highlight and its exponent
     rows: Floats  # shapes
-    media: Floats  # (m, 4): ior, absorption
+    media: Floats  # (m, 5): ior, absorption, 1 where it disperses
     patterns: Floats
     texels: Floats
     lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
@@ -61,20 +62,18 @@ class Arrays(NamedTuple):
 class _Flattener:
     """Collects rows while it walks over a scene."""
 
-    def __init__(self) -> None:
+    def __init__(self, media: list[Medium]) -> None:
         self.objects: list[list[int]] = []
         self.balls: list[list[float]] = []
         self.materials: list[list[float]] = []
         self.rows: list[list[float]] = []
-        self.media: list[Medium] = []
+        self.media = media
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
         self.trees: list[Tree] = []
         self.nodes = self.triangles = self.normals = self.texel_count = 0
 
     def medium(self, medium: Medium) -> int:
-        if medium not in self.media:
-            self.media.append(medium)
         return self.media.index(medium)
 
     def solid(self, solid: Solid) -> None:
@@ -141,6 +140,11 @@ class _Flattener:
                 kind, count = CELL, len(bounds)
                 ball = [*center, radius * radius * (1.0 + 1e-9)]
                 self.rows += [bound_row(bound) for bound in bounds]
+            case Compound(where, center, radius):
+                rows = compound_rows(where)
+                kind, count = COMPOUND, len(rows)
+                ball = [*center, radius * radius * (1.0 + 1e-9)]
+                self.rows += rows
             case Rectangle() | Disk():
                 kind = DISK if isinstance(shape, Disk) else RECTANGLE
                 self.rows.append(face_row(shape))
@@ -161,6 +165,26 @@ class _Flattener:
         self.triangles += len(tree.triangles)
         self.normals += len(tree.normals)
         return first_normal
+
+
+def media_of(scene: Scene) -> list[Medium]:
+    """All media of a scene, each once; the camera's first."""
+    found = [scene.around_camera, VACUUM]
+    for solid in scene.solids:
+        found += [solid.medium, solid.exterior]
+    for surface in scene.surfaces:
+        if isinstance(surface.material, ThinSlab):
+            found += [surface.material.medium, surface.material.exterior]
+    return list(dict.fromkeys(found))
+
+
+def media_table(media: list[Medium], wavelength: float) -> Floats:
+    """The one table of `Arrays` that depends on the wavelength."""
+    rows = [
+        [m.index(wavelength), *m.absorption, float(not isinstance(m.ior, float | int))]
+        for m in media
+    ]
+    return _table(rows, 5)
 
 
 def _light(light: PointLight | DirectionalLight) -> list[float]:
@@ -194,9 +218,8 @@ def flatten(scene: Scene) -> Arrays:
 
 
 def _flatten(scene: Scene) -> Arrays:
-    into = _Flattener()
-    into.medium(scene.around_camera)
-    into.medium(VACUUM)
+    media = media_of(scene)
+    into = _Flattener(media)
     for solid in scene.solids:
         into.solid(solid)
     for surface in scene.surfaces:
@@ -210,7 +233,7 @@ def _flatten(scene: Scene) -> Arrays:
         balls=_table(into.balls, 4),
         materials=_table(into.materials, 9),
         rows=_table(into.rows, COLUMNS),
-        media=_table([[m.ior, *m.absorption] for m in into.media], 4),
+        media=media_table(media, scene.wavelength),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([_light(light) for light in scene.lights], 7),

@@ -86,7 +86,9 @@ def camera_row(camera: Camera, width: int, height: int) -> NDArray[np.float64]:
 
 
 @inlined
-def primary_ray(row: NDArray[np.float64], x: float, y: float, u: float, v: float) -> tuple[Vec, Vec]:
+def primary_ray(
+    row: NDArray[np.float64], x: float, y: float, u: float, v: float
+) -> tuple[Vec, Vec]:
     """(origin, direction) through the film at x, y in [-1, 1], x to the right and y up.
 
     `u`, `v` in the unit disk say through which point of the lens, where there is one.

@@ -64,38 +64,45 @@ class Sampling:
             raise SceneError(f"a pixel has 1 to 64 samples a side, not {self.side}")
 
 
-def weights(pixels: int, sampling: Sampling) -> tuple[Floats, NDArray[np.int64]]:
-    """Along one axis: what each sample counts in a pixel, and where they begin; (P, n) and (P,).
+def reach(sampling: Sampling) -> int:
+    """How many samples beyond a pixel's own, on each side, count in it."""
+    return max(0, math.ceil((sampling.filter.reach - 0.5) * sampling.side - 0.5))
 
-    Rows sum to 1. At the film's border, where samples are missing, the others count more.
+
+def weights(
+    sampling: Sampling, begin: int, end: int, pixels: int
+) -> tuple[Floats, NDArray[np.int64]]:
+    """What samples count in pixels [begin, end) of `pixels` along one axis: (n, k), and which (n,).
+
+    The k-th column is for the sample that many behind the named one. Rows sum to 1: at the film's
+    border, where samples are missing, the others count more.
     """
-    side = sampling.side
-    reach = math.ceil(sampling.filter.reach * side - 0.5)
-    offsets = np.arange(-reach, side + reach)
-    if isinstance(sampling.filter, Box):
-        offsets = np.arange(side)
-    distance = np.abs((offsets + 0.5) / side - 0.5)
-    first = np.arange(pixels) * side + offsets[0]
+    side, beyond = sampling.side, reach(sampling)
+    offsets = np.arange(-beyond, side + beyond)
+    first = np.arange(begin, end) * side - beyond
     where = first[:, None] + np.arange(len(offsets))
-    inside = (where >= 0) & (where < pixels * side)
-    table = np.where(inside, sampling.filter.weight(distance), 0.0)
+    there = (where >= 0) & (where < pixels * side)
+    distance = np.abs((offsets + 0.5) / side - 0.5)
+    table = np.where(there, sampling.filter.weight(distance), 0.0)
     return table / table.sum(axis=1, keepdims=True), first
 
 
-def developed(samples: Floats, sampling: Sampling) -> Floats:
-    """The pixels (H, W, ...) of samples (side H, side W, ...)."""
+def developed(
+    samples: Floats, sampling: Sampling, first: int, begin: int, end: int, height: int
+) -> Floats:
+    """Rows [begin, end) of the pixels (H, W, ...); row 0 of the samples is row `first` of all."""
     if sampling.side == 1 and isinstance(sampling.filter, Box):
         return samples
-    for axis in (0, 1):
-        samples = _along(samples, axis, sampling)
-    return samples
+    table, start = weights(sampling, begin, end, height)
+    rows = _weighed(samples, table, start - first)
+    width = samples.shape[1] // sampling.side
+    table, start = weights(sampling, 0, width, width)
+    return np.swapaxes(_weighed(np.swapaxes(rows, 0, 1), table, start), 0, 1)
 
 
-def _along(samples: Floats, axis: int, sampling: Sampling) -> Floats:
-    moved = np.moveaxis(samples, axis, 0)
-    table, first = weights(len(moved) // sampling.side, sampling)
-    result = np.zeros((len(table), *moved.shape[1:]))
+def _weighed(samples: Floats, table: Floats, start: NDArray[np.int64]) -> Floats:
+    result = np.zeros((len(table), *samples.shape[1:]))
     for k in range(table.shape[1]):
-        at = np.clip(first + k, 0, len(moved) - 1)  # those outside weigh nothing
-        result += table[:, k].reshape(-1, *[1] * (moved.ndim - 1)) * moved[at]
-    return np.moveaxis(result, 0, axis)
+        at = np.clip(start + k, 0, len(samples) - 1)  # those outside weigh nothing
+        result += table[:, k].reshape(-1, *[1] * (samples.ndim - 1)) * samples[at]
+    return result

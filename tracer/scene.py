@@ -9,24 +9,36 @@ from tracer.camera import Camera
 from tracer.errors import SceneError
 from tracer.mesh import Mesh
 from tracer.patterns import Pattern, Picture
-from tracer.shapes import Cell, Disk, Rectangle, Sphere
+from tracer.shapes import Disk, Rectangle, Sphere
+from tracer.solids import Cell, Compound
+from tracer.spectrum import LINE_D, Dispersion
 from tracer.vector import Vec
 
-Shape = Sphere | Cell | Mesh | Rectangle | Disk
+SolidShape = Sphere | Cell | Compound | Mesh
+Shape = SolidShape | Rectangle | Disk
 
 
 @dataclass(frozen=True)
 class Medium:
-    """`ior` is the absolute index; light decays as ``exp(-absorption * length)`` per colour."""
+    """`ior` is the absolute index; light decays as ``exp(-absorption * length)`` per colour.
 
-    ior: float
+    A medium that disperses has a formula for an index, which is taken at the scene's wavelength.
+    """
+
+    ior: float | Dispersion
     absorption: Vec = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.ior < math.inf):
+        if isinstance(self.ior, float | int) and not (0.0 < self.ior < math.inf):
             raise SceneError(f"an index of refraction must be positive, not {self.ior}")
         if not all(0.0 <= a < math.inf for a in self.absorption):
             raise SceneError(f"absorption must be at least 0 and finite, not {self.absorption}")
+
+    def index(self, wavelength_nm: float) -> float:
+        """The index of refraction at a wavelength. Raises SceneError where the formula has none."""
+        if isinstance(self.ior, float | int):
+            return float(self.ior)
+        return self.ior.ior(wavelength_nm)
 
 
 VACUUM = Medium(1.0)
@@ -36,7 +48,7 @@ VACUUM = Medium(1.0)
 class Solid:
     """A closed shape filled with `medium`, lying wholly inside `exterior`."""
 
-    shape: Sphere | Cell | Mesh
+    shape: SolidShape
     medium: Medium
     exterior: Medium = VACUUM
     name: str = "solid"
@@ -145,7 +157,9 @@ class DirectionalLight:
     irradiance: Vec
 
     def __post_init__(self) -> None:
-        if abs(math.hypot(*self.direction) - 1.0) > 1e-9 or not all(map(math.isfinite, self.irradiance)):
+        if abs(math.hypot(*self.direction) - 1.0) > 1e-9 or not all(
+            map(math.isfinite, self.irradiance)
+        ):
             raise SceneError(f"a light needs a unit direction and finite numbers, not {self}")
 
 
@@ -174,7 +188,9 @@ class Transport:
 
 @dataclass(frozen=True)
 class Scene:
-    """`background` is what rays see that leave the scene: a radiance, or a picture of all around.
+    """`wavelength`, in nm, is what media that disperse are taken at.
+
+    `background` is what rays see that leave the scene: a radiance, or a picture of all around.
 
     Such a picture is an equirectangular panorama: its middle lies along -z, +x is to the right of
     it, and its top row is above (+y).
@@ -186,4 +202,5 @@ class Scene:
     lights: tuple[PointLight | DirectionalLight, ...] = ()
     background: Vec | Picture = (0.0, 0.0, 0.0)
     around_camera: Medium = VACUUM
+    wavelength: float = LINE_D
     transport: Transport = field(default_factory=Transport)

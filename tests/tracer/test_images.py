@@ -10,9 +10,9 @@ import pytest
 
 from tracer.camera import Orthographic, Perspective
 from tracer.errors import SceneError
+from tracer.image import render
 from tracer.mesh import Mesh
 from tracer.patterns import Checker, Constant, Picture, PositionCode, Ramp
-from tracer.recursion import render
 from tracer.scene import (
     Diffuse,
     Emissive,
@@ -26,7 +26,8 @@ from tracer.scene import (
     Translucent,
     Transport,
 )
-from tracer.shapes import Rectangle, Sphere, cylinder
+from tracer.shapes import Rectangle, Sphere
+from tracer.solids import cylinder
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
