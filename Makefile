@@ -1,17 +1,22 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite test lint format lock clean
+.PHONY: help setup suite references test lint format lock clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 
 setup: ## Install what is missing: the Python environment, POV-Ray, libLLVM
 	@scripts/setup
 
 suite: setup ## Run the conformance suite and write reports/latest/index.html
 	@$(BIN)/snellcheck run $(ARGS)
+
+references: setup ## Measure the committed baselines anew: make references REASON="…"
+	@test -n "$(REASON)" || { echo 'say why: make references REASON="…"'; exit 2; }
+	@$(BIN)/snellcheck run --no-stored --out reports/references
+	@$(BIN)/snellcheck approve '*' --run reports/references --reason "$(REASON)"
 
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2

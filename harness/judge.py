@@ -12,6 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness import plan
+from harness.attribution import attributed
+from harness.explain import Explainer
 from harness.measure import light_observables, radiance, ray_observables
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
@@ -21,12 +23,12 @@ from harness.measure.rays import RayMeasurement, from_images, from_paths
 from harness.pairs import PairJudge
 from harness.plan import PreparedCase
 from harness.probe.scenes import AXES
-from harness.record import Check, Curve, Verdict
+from harness.record import Check, Curve, Diagnosis, Verdict
 from harness.renderers.base import Capability, RayPaths
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolve import expand_thin_slabs
-from harness.verdict import judge, unmeasured
+from harness.verdict import check_id, judge, unmeasured
 
 # The chance of a false alarm of one check of a sampled picture, over all of its means. A suite of
 # a hundred such checks cries wolf once in a hundred runs.
@@ -51,7 +53,7 @@ BOUNDARIES = {
 
 @dataclass
 class Judgement:
-    """All checks of a case in the order of its scene file, and the curves they drew.
+    """All checks of a case in the order of its scene file, their curves, and why who is off.
 
     `rays` are those that were measured on the way, probe by probe.
     """
@@ -59,6 +61,7 @@ class Judgement:
     checks: list[Check] = field(default_factory=list)
     curves: list[Curve] = field(default_factory=list)
     rays: list[ProbeRays] = field(default_factory=list)
+    diagnoses: list[Diagnosis] = field(default_factory=list)
 
 
 class CaseJudge:
@@ -90,6 +93,10 @@ class CaseJudge:
                         _merge(judgement.curves, spec, curve, contender.name)
             else:
                 judgement.checks += self._pairs.checks(spec, contenders, self._contenders)
+        judgement.checks = attributed(judgement.checks)
+        explainer = Explainer(self._case, self._results, self._truth, self._measured)
+        found = (explainer.explain(c, judgement.checks) for c in self._contenders)
+        judgement.diagnoses = [diagnosis for diagnosis in found if diagnosis is not None]
         judgement.rays = [ProbeRays(*item) for item in self._measured_probes()]
         return judgement
 
@@ -102,6 +109,8 @@ class CaseJudge:
     def _against_truth(
         self, spec: model.CheckSpec, contender: Contender
     ) -> tuple[Check, Curve | None]:
+        if contender.stored is not None:
+            return self._stored(spec, contender), None
         try:
             comparison = self._compare(spec, contender)
         except NotAvailable as gap:
@@ -109,6 +118,14 @@ class CaseJudge:
         except (Unmeasurable, ValueError) as error:
             return unmeasured(spec, contender.name, "truth", Verdict.ERROR, str(error)), None
         return judge(spec, contender.name, "truth", comparison), comparison.curve
+
+    def _stored(self, spec: model.CheckSpec, contender: Contender) -> Check:
+        """The approved result of a renderer that is not there, marked as such."""
+        check = contender.stored_checks.get(check_id(spec, contender.name, "truth"))
+        if check is None or contender.stored is None:
+            reason = f"{contender.reason}; nothing is stored for this check"
+            return unmeasured(spec, contender.name, "truth", Verdict.SKIP, reason)
+        return check.model_copy(update={"stored": [contender.name]})
 
     def _compare(self, spec: model.CheckSpec, contender: Contender) -> Comparison:
         observable, preflight = Observable(spec.observable), contender.ready()

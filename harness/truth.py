@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.chord import Body, Chord
-from harness.expected import Float, fresnel, reflect, refract
+from harness.expected import Float, reflect
+from harness.law import PHYSICS, Interface, Law, Leg
 from harness.renderers.base import Rays, Status
-from harness.scene.resolved import Rectangle, ResolvedScene
+from harness.scene.resolved import Mesh, Rectangle, ResolvedScene
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,19 @@ class Landing:
 
 
 class ClosedForm:
-    """A scene prepared for exact tracing. Raises ValueError where it has no closed form."""
+    """A scene prepared for exact tracing. Raises ValueError where it has no closed form.
 
-    def __init__(self, scene: ResolvedScene) -> None:
-        self.scene = scene
+    `law` is physics, or what a renderer might do in its place.
+    """
+
+    def __init__(self, scene: ResolvedScene, law: Law = PHYSICS) -> None:
+        self.scene, self.law = scene, law
         self._bodies = [Body(solid) for solid in scene.solids]
+        self._meshes = np.array([isinstance(s.shape, Mesh) for s in scene.solids] or [False])
 
     def follow(self, rays: Rays, path: str) -> TruePaths:
         """Rays from the camera along `path`."""
-        scene, bodies = self.scene, self._bodies
+        scene, bodies, law = self.scene, self._bodies, self.law
         m, count = len(rays.origins), len(path)
         rows = np.arange(m)
         o, d = rays.origins.copy(), rays.directions.copy()
@@ -89,24 +94,26 @@ class ClosedForm:
             live = status == Status.HIT
             t = np.where(live, t, 0.0)
             o = o + t[:, None] * d
-            absorbed += t[:, None] * sigma[medium]
-            facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
-            beyond = np.where(
-                live, _beyond(bodies, which, inside[which, rows] if bodies else live), 0
-            )
-            c = np.clip(-np.einsum("ij,ij->i", d, facing), 0, 1)
-            reflectance = fresnel(c, ior[medium], ior[beyond])
+            start = normals[:, k - 1] if k else None
+            absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
+            facing = law.normal(np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n))
+            leaving = inside[which, rows] if bodies else live
+            beyond = np.where(live, _beyond(bodies, which, leaving), 0)
+            at = Interface(o, d, facing, ior[medium], ior[beyond], ~leaving, t, self._meshes[which])
+            c, reflectance = at.cos_theta_i, law.reflectance(at)
             cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
             if letter == "R":
                 weight *= np.where(live, reflectance, 1.0)
                 d = np.where(live[:, None], reflect(d, facing), d)
+                o = law.start(at, d)
                 continue
             eta[:, k] = ior[medium] / ior[beyond]
-            bent, total = refract(d, facing, ior[medium], ior[beyond])
+            bent, total = law.bend(at)
             status[live & total] = Status.TIR
             live &= ~total
-            weight *= np.where(live, 1 - reflectance, 1.0)
+            weight *= np.where(live, law.transmittance(at, reflectance), 1.0)
             d = np.where(live[:, None], bent, d)
+            o = law.start(at, d)
             inside[which[live], np.flatnonzero(live)] ^= True
             medium = np.where(live, beyond, medium)
         ahead, _, _ = _next_interface([body.chord(o, d) for body in bodies], inside)
@@ -130,7 +137,9 @@ class ClosedForm:
         landed = status == Status.HIT
         point[~landed] = np.nan
         sigma = np.array([medium.absorption for medium in self.scene.media])
-        depth = paths.absorbed + np.where(landed, t, 0.0)[:, None] * sigma[paths.medium]
+        start = paths.n[:, -1] if paths.n.shape[1] else None
+        leg = Leg(np.where(landed, t, 0.0), d, sigma[paths.medium], start, "")
+        depth = paths.absorbed + self.law.depth(leg)
         return Landing(status, point, np.exp(-depth))
 
 

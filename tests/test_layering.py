@@ -22,8 +22,9 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores"),
-    ("record", "imagefile", "expected", "measure.observables"),
+    ("errors", "data", "cores", "fingerprint", "documents", "outcomes"),
+    ("record", "imagefile", "expected", "law", "measure.observables"),
+    ("cache",),
     ("scene",),
     ("renderers.base",),
     ("camera", "chord", "section", "translate"),
@@ -31,10 +32,12 @@ LAYERS = (
     ("renderers",),
     ("probe",),
     ("measure",),
+    ("diagnosis",),
     ("chart",),
-    ("verdict", "preflight"),
+    ("verdict", "preflight", "attribution"),
     ("report",),
-    ("plan", "results", "pairs", "judge", "packing", "archive", "lanes", "run"),
+    ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
+    ("parcel", "memo", "bundle", "lanes", "session", "run"),
     ("doctor",),
     ("show", "cli"),
 )
@@ -181,7 +184,7 @@ def test_reports_know_only_records(file: str) -> None:
     assert not [str(i) for i in imports_of(file) if i.stage not in allowed]
 
 
-@pytest.mark.parametrize("file", ["expected", "truth", "chord"])
+@pytest.mark.parametrize("file", ["expected", "law", "truth", "chord"])
 def test_truth_knows_neither_the_tracer_nor_any_renderer(file: str) -> None:
     imports = imports_of(f"harness/{file}.py")
     assert not [str(i) for i in imports if i.package == "tracer"]

@@ -17,6 +17,7 @@ EXIT_CODES = {
     1: "a check failed",
     2: "bad usage or bad input",
     3: "something asked for could not run",
+    130: "interrupted",
 }
 
 
