@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite references test lint format lock clean
+.PHONY: help setup suite references test lint format lock ui clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -32,6 +32,9 @@ format: setup ## Mend what of the style can be mended by a program
 
 lock: ## Rebuild requirements/*.txt from pyproject.toml (UPGRADE=1: newer versions)
 	@scripts/lock
+
+ui: ## Rebuild the report's script from harness/report/ui (needs Node)
+	@cd harness/report/ui && npm ci --silent && npm run --silent build
 
 clean: ## Remove the environment, caches and reports
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -8,11 +8,12 @@ import json
 import platform
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from harness import __version__, plan, record
+from harness.documents import PARTIAL
 from harness.errors import RendererError, RendererFailed
 from harness.judge import Judgement
 from harness.measure.images import Pixels
@@ -39,6 +40,18 @@ def folder_name(case_id: str) -> str:
     return f"{plain}-{hashlib.sha256(case_id.encode()).hexdigest()[:8]}"
 
 
+def belongs(path: str, name: str) -> bool:
+    """Whether a path relative to a run's folder is of the case whose `folder_name` is `name`.
+
+    All that is written for a case is ``FOLDER/NAME.…`` or ``FOLDER/NAME/…``; the report's pages in
+    ``cases/`` are made anew from that.
+    """
+    parts = PurePosixPath(path).parts
+    if len(parts) < 2 or parts[0] in ("/", "cases") or ".." in parts:
+        return False
+    return parts[1].startswith(f"{name}.") if len(parts) == 2 else parts[1] == name
+
+
 class Archive:
     """The folder of one run."""
 
@@ -60,6 +73,7 @@ class Archive:
     ) -> CaseRecord:
         """Writes the images of a case, its scene and its record; returns the record."""
         loaded, name = case.loaded, folder_name(case.loaded.id)
+        self.discard(name)
         scene_json = case.scene.model_dump_json()
         record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
         runs = [self._run(case, c, name, results, judgement, seconds, settings) for c in contenders]
@@ -98,6 +112,26 @@ class Archive:
         )
         record.write(written, self.root / "records" / f"{name}.json")
         return written
+
+    def discard(self, name: str) -> None:
+        """Removes what an earlier run left of a case, its record first: no record, no case."""
+        (self.root / "records" / f"{name}.json").unlink(missing_ok=True)
+        for path in self.files(name):
+            (self.root / path).unlink(missing_ok=True)
+
+    def sweep(self) -> None:
+        """Removes files that a run was writing when it was killed."""
+        for folder in ("assets", "cases", "data", "images", "records", "scenes"):
+            for path in (self.root / folder).rglob(".*"):
+                if PARTIAL.fullmatch(path.name) and path.is_file():
+                    path.unlink(missing_ok=True)
+
+    def files(self, name: str) -> list[str]:
+        """The paths of all that belongs to a case, its record last, relative to the folder."""
+        found = [*self.root.glob(f"*/{name}.*"), *self.root.glob(f"*/{name}/**/*")]
+        paths = [path.relative_to(self.root).as_posix() for path in found if path.is_file()]
+        mine = [path for path in paths if belongs(path, name)]
+        return sorted(mine, key=lambda path: (path.startswith("records/"), path))
 
     def _run(
         self,

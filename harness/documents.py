@@ -25,6 +25,10 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
+# What `write_bytes` calls a file before it is whole.
+PARTIAL = re.compile(r"\..+\.[a-z0-9_]{8}")
+
+
 def write_bytes(path: Path, data: bytes) -> None:
     """Writes all of `data` or nothing: to a temporary name beside `path`, then renamed."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -268,6 +268,19 @@ class Counts(Model):
     known: int = 0
 
 
+class Effort(Model):
+    """What the jobs of a run cost: results `rendered` anew and `reused` from earlier.
+
+    `retried` counts repetitions after failures that were not the renderer's (a lost machine, a
+    process that could not be started), `damaged` entries of the cache that were made again.
+    """
+
+    rendered: int = 0
+    reused: int = 0
+    retried: int = 0
+    damaged: int = 0
+
+
 class SummaryCase(Model):
     id: str
     family: str
@@ -291,6 +304,8 @@ class Summary(Model):
     cases: list[SummaryCase]
     baseline: BaselineSummary | None = None
     diagnoses: list[Diagnosis] = Field(default_factory=list)  # one per renderer that is off
+    effort: Effort = Effort()
+    interrupted: bool = False  # then cases that were not judged yet are ERROR and have no record
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"

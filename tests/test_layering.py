@@ -22,8 +22,9 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores", "documents", "outcomes"),
+    ("errors", "data", "cores", "fingerprint", "documents", "outcomes"),
     ("record", "imagefile", "expected", "law", "measure.observables"),
+    ("cache",),
     ("scene",),
     ("renderers.base",),
     ("camera", "chord", "section", "translate"),
@@ -36,7 +37,7 @@ LAYERS = (
     ("verdict", "preflight", "attribution"),
     ("report",),
     ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
-    ("lanes", "run"),
+    ("parcel", "memo", "bundle", "lanes", "session", "run"),
     ("doctor", "ci"),
     ("show", "cli", "pytest_plugin"),
 )
