@@ -57,6 +57,18 @@ class Landing:
     transmission: Float
 
 
+@dataclass(frozen=True)
+class Interface:
+    """The next boundary on each of m rays: distance `t` (infinite where there is none), normal `n`
+    facing the ray, index `which` of its solid, and the medium `beyond` it.
+    """
+
+    t: Float
+    n: Float
+    which: NDArray[np.intp]
+    beyond: NDArray[np.intp]
+
+
 class ClosedForm:
     """A scene prepared for exact tracing. Raises ValueError where it has no closed form."""
 
@@ -116,9 +128,24 @@ class ClosedForm:
 
     def land(self, paths: TruePaths, plane: Rectangle) -> Landing:
         """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
+        return self.meet(
+            plane, paths.origin, paths.direction, paths.ahead, paths.medium, paths.absorbed,
+            paths.status,
+        )  # fmt: skip
+
+    def meet(
+        self,
+        plane: Rectangle,
+        o: Float,
+        d: Float,
+        ahead: Float,
+        medium: NDArray[np.intp],
+        absorbed: Float,
+        status: NDArray[np.int8] | None = None,
+    ) -> Landing:
+        """The same for rays from `o` along `d`, each (m, 3), whose next interface is `ahead`."""
         frame = plane.frame
-        o, d = paths.origin, paths.direction
-        status = paths.status.copy()
+        status = np.full(len(o), Status.HIT, np.int8) if status is None else status.copy()
         with np.errstate(divide="ignore", invalid="ignore"):
             t = ((np.array(frame.origin) - o) @ np.array(frame.z)) / (d @ np.array(frame.z))
             point = o + t[:, None] * d
@@ -126,12 +153,27 @@ class ClosedForm:
             x, y = local @ np.array(frame.x), local @ np.array(frame.y)
             on = (t > 0) & (np.abs(x) <= plane.size[0] / 2) & (np.abs(y) <= plane.size[1] / 2)
         status[(status == Status.HIT) & ~on] = Status.MISS
-        status[(status == Status.HIT) & (paths.ahead < t)] = Status.CUT
+        status[(status == Status.HIT) & (ahead < t)] = Status.CUT
         landed = status == Status.HIT
         point[~landed] = np.nan
         sigma = np.array([medium.absorption for medium in self.scene.media])
-        depth = paths.absorbed + np.where(landed, t, 0.0)[:, None] * sigma[paths.medium]
+        depth = absorbed + np.where(landed, t, 0.0)[:, None] * sigma[medium]
         return Landing(status, point, np.exp(-depth))
+
+    def enclosed(self, rays: Rays) -> NDArray[np.bool_]:
+        """(solids, m) which solids the rays start in."""
+        chords = [body.chord(rays.origins, rays.directions) for body in self._bodies]
+        within = [(c.t_in < 0) & (c.t_out > 0) for c in chords]
+        return np.array(within, bool).reshape(len(self._bodies), len(rays.origins))
+
+    def next_interface(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Interface:
+        """The next boundary of rays from `o` along `d` that are in the solids `inside`."""
+        chords = [body.chord(o, d) for body in self._bodies]
+        t, n, which = _next_interface(chords, inside)
+        rows = np.arange(len(o))
+        leaving = inside[which, rows] if self._bodies else np.zeros(len(o), bool)
+        facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
+        return Interface(t, facing, which, _beyond(self._bodies, which, leaving))
 
 
 def _next_interface(

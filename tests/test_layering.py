@@ -23,11 +23,12 @@ ROOT = Path(__file__).resolve().parent.parent
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
     ("errors", "data", "cores"),
-    ("record", "imagefile", "expected", "measure.observables"),
+    ("record", "imagefile", "expected", "expected_systems", "measure.observables"),
     ("scene",),
     ("renderers.base",),
     ("camera", "chord", "translate"),
     ("truth",),
+    ("tree",),
     ("renderers",),
     ("probe",),
     ("measure",),

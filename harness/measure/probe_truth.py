@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from harness.measure.precision import Precision
 from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
 from harness.scene.resolved import Rectangle, ResolvedScene
+from harness.tree import branches, natural_weight
 from harness.truth import ClosedForm, Landing, TruePaths
 
 # Step of the differences, relative to the scene's extent. Larger than any float32 renderer's own
@@ -82,13 +82,19 @@ class ProbeTruth:
         of a ball, for one, what is reflected goes on to the backdrop behind it.
         """
         exact, found = ClosedForm(self.scene), np.zeros(len(self.grazing), bool)
-        for count in range(len(self.path) + 1):
-            for letters in product("TR", repeat=count):
-                if (other := "".join(letters)) != self.path:
-                    paths = exact.follow(self.rays, other)
-                    for plane in self.planes:
-                        found |= exact.land(paths, plane).status == Status.HIT
+        for branch in branches(exact, self.rays, len(self.path) + 1):
+            if branch.path != self.path:
+                way = (branch.origin, branch.direction, branch.ahead)
+                for plane in self.planes:
+                    landing = exact.meet(plane, *way, branch.medium, branch.absorbed)
+                    found[branch.rows] |= landing.status == Status.HIT
         return found
+
+    @cached_property
+    def natural_level(self) -> Float:
+        """(m, 3) what the path leaves of radiance 1 in nature, where light is polarised."""
+        weight = natural_weight(ClosedForm(self.scene), self.rays, self.path)
+        return np.asarray(weight[:, None] * self.landings[0].transmission)
 
     @property
     def theta_i(self) -> Float:

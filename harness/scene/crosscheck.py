@@ -11,6 +11,7 @@ from functools import cache
 
 from harness.errors import nearest
 from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
     IMAGE_OBSERVABLES,
     LIGHT_OBSERVABLES,
     TRUTH_OBSERVABLES,
@@ -145,11 +146,18 @@ def _probe(
         expected = ", ".join(sorted(probes or ())) or "a probe that the scene defines"
         yield Finding(where, "missing", None, expected)
         return
-    measure = "light" if observable in LIGHT_OBSERVABLES else "position"
+    measure = measure_of(observable)
     probe = probes.get(name) if probes is not None and isinstance(name, str) else None
     if probe is not None and probe.get("measure", "position") != measure:
         expected = f'a probe with measure = "{measure}"'
         yield Finding(where, f"{observable} needs another probe", quoted(name), expected)
+
+
+def measure_of(observable: Observable) -> str:
+    """What a probe must measure for `observable`."""
+    if observable in ALL_LIGHT_OBSERVABLES:
+        return "all-light"
+    return "light" if observable in LIGHT_OBSERVABLES else "position"
 
 
 def _known(deviation: Table, path: KeyPath, renderers: Collection[str]) -> Iterator[Finding]:

@@ -292,7 +292,10 @@ class Probe(Strict):
     `path` has a letter per interface: T transmit, R reflect. `planes` are the backdrops on which
     rays are caught, each in a render of its own. With `measure` "position" they carry position
     codes of at most `cells` cells, and two of them give the direction; with "light" the first one
-    has radiance 1, so that a pixel shows the weight of the path.
+    has radiance 1, so that a pixel shows the weight of the path. With "all-light" it shows the
+    light of all paths together that the scene's transport allows; `path` is the shortest of them.
+    `total_reflection` says that all R of the path are total, so that a renderer that can switch
+    partial reflection off shows this path alone.
     """
 
     name: Name
@@ -300,7 +303,8 @@ class Probe(Strict):
         str, Field(pattern=r"^[TR]*$", max_length=64, description="letters T and R, as in TRT")
     ]
     planes: Annotated[tuple[Rectangle, ...], Field(min_length=1, max_length=2)]
-    measure: Literal["position", "light"] = "position"
+    measure: Literal["position", "light", "all-light"] = "position"
+    total_reflection: bool = False
     cells: Annotated[int, Field(ge=1, le=16383)] = 4095
 
 
