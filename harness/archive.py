@@ -15,6 +15,7 @@ from harness import __version__, plan, record
 from harness.errors import RendererError, RendererFailed
 from harness.judge import Judgement
 from harness.measure.images import Pixels
+from harness.packing import write_pack
 from harness.plan import PreparedCase
 from harness.probe.scenes import AXES
 from harness.probe.view import view_of_codes, view_of_rays
@@ -59,6 +60,10 @@ class Archive:
         scene_json = case.scene.model_dump_json()
         record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
         runs = [self._run(case, c, name, results, judgement, seconds, settings) for c in contenders]
+        pack = f"data/{name}.js"
+        write_pack(
+            self.root / pack, loaded.id, _pictures(case, contenders, results), judgement.rays
+        )
         written = CaseRecord(
             id=loaded.id,
             case=loaded.case,
@@ -82,6 +87,7 @@ class Archive:
             differences=self._differences(name, contenders, results),
             tables=[Table.model_validate(t.model_dump(mode="json")) for t in loaded.model.tables],
             files={"scene.json": f"scenes/{name}.json"},
+            pack=pack,
         )
         record.write(written, self.root / "records" / f"{name}.json")
         return written
@@ -182,11 +188,25 @@ def _shown(case: PreparedCase, mine: Mapping[str, object]) -> Iterator[tuple[str
         coded = mine.get(plan.code_role(probe, 0, AXES[0]))
         lit = mine.get(plan.light_role(probe))
         if isinstance(traced, RayPaths):
-            yield "probe", view_of_rays(traced, case.planes(probe)[0], case.scene.film)
+            view = view_of_rays(traced, case.planes(probe)[0], case.scene.film)
+            if view is not None:
+                yield "probe", view
         elif isinstance(coded, Image):
             yield "probe", view_of_codes(coded.pixels)
         elif isinstance(lit, Image):
             yield "probe", lit.pixels
+
+
+def _pictures(
+    case: PreparedCase, contenders: list[Contender], results: Results
+) -> dict[tuple[str, str], Pixels]:
+    """All pictures worth keeping, by renderer and role."""
+    found = {}
+    for contender in contenders:
+        mine = {role: r for (who, role), r in results.by_role.items() if who == contender.name}
+        for role, pixels in _shown(case, mine):
+            found[contender.name, role] = np.asarray(pixels, np.float32)
+    return found
 
 
 def scene_text(case: PreparedCase) -> str:

@@ -6,6 +6,7 @@ renderer that is absent, failed or cannot do it is named with its reason, never 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,6 +16,7 @@ from harness.measure import light_observables, radiance, ray_observables
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.measure.probe_truth import ProbeTruth, probe_truth
+from harness.measure.raymap import ProbeRays
 from harness.measure.rays import RayMeasurement, from_images, from_paths
 from harness.pairs import PairJudge
 from harness.plan import PreparedCase
@@ -49,10 +51,14 @@ BOUNDARIES = {
 
 @dataclass
 class Judgement:
-    """All checks of a case in the order of its scene file, and the curves they drew."""
+    """All checks of a case in the order of its scene file, and the curves they drew.
+
+    `rays` are those that were measured on the way, probe by probe.
+    """
 
     checks: list[Check] = field(default_factory=list)
     curves: list[Curve] = field(default_factory=list)
+    rays: list[ProbeRays] = field(default_factory=list)
 
 
 class CaseJudge:
@@ -84,7 +90,14 @@ class CaseJudge:
                         _merge(judgement.curves, spec, curve, contender.name)
             else:
                 judgement.checks += self._pairs.checks(spec, contenders, self._contenders)
+        judgement.rays = [ProbeRays(*item) for item in self._measured_probes()]
         return judgement
+
+    def _measured_probes(self) -> Iterator[tuple[str, ProbeTruth, dict[str, RayMeasurement]]]:
+        for probe, truth in self._truths.items():
+            measured = {name: rays for (name, of), rays in self._rays.items() if of == probe}
+            if measured:
+                yield probe, truth, measured
 
     def _against_truth(
         self, spec: model.CheckSpec, contender: Contender

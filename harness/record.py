@@ -117,6 +117,19 @@ class Series(Model):
     y: list[float]
 
 
+class RayPath(Model):
+    """One ray from where it starts to where it ends: k + 1 `vertices` in scene units, k legs.
+
+    `weights` say what each leg carries. `angles` are (incident, outgoing) at each of the k - 1
+    vertices between, in degrees from the normal; a reflected ray leaves on the side it came from.
+    """
+
+    label: str = ""
+    vertices: list[tuple[float, float, float]]
+    weights: list[float]
+    angles: list[tuple[float, float]]
+
+
 class Curve(Model):
     """A measured curve beside its truth, with what is left when truth is taken away.
 
@@ -168,6 +181,7 @@ class CaseRecord(Model):
     differences: list[DifferenceMap] = Field(default_factory=list)
     tables: list[Table] = Field(default_factory=list)
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: scene.json …
+    pack: str | None = None  # relative path: pixels and rays as numbers, for the report's pages
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -43,8 +44,17 @@ def test_the_commands_that_it_names_exist(command: str) -> None:
 
 @pytest.mark.parametrize("option", sorted(set(re.findall(r"(?<=\s)--[a-z-]+", README))))
 def test_the_options_that_it_names_exist(option: str) -> None:
-    known = {o for command in main.commands.values() for p in command.params for o in p.opts}
-    assert option in known
+    assert option in options_of(main)
+
+
+def options_of(command: click.Command) -> set[str]:
+    """The options of a command and of those below it."""
+    own = {option for parameter in command.params for option in parameter.opts}
+    if not isinstance(command, click.Group):
+        return own
+    context = click.Context(command)
+    below = [command.get_command(context, name) for name in command.list_commands(context)]
+    return own.union(*(options_of(sub) for sub in below if sub is not None))
 
 
 def test_the_cases_that_it_names_exist() -> None:

@@ -17,14 +17,17 @@ Pixels = NDArray[np.float32]
 
 
 def view_of_codes(coded: Pixels) -> Pixels:
-    """From a picture (H, W, 3) of a fine code along u."""
-    level = coded[..., 2:]
+    """From a picture (H, W, 3) of a fine code along u; NaN where the picture is not finite."""
+    finite = np.isfinite(coded).all(axis=-1, keepdims=True)
+    level = np.where(finite, coded[..., 2:], 0.0)
     coarse = np.divide(coded[..., :1], level, out=np.zeros_like(level), where=level > 0)
-    return _colours(coarse, level)
+    return np.where(finite, _colours(coarse, level), np.float32(np.nan))
 
 
-def view_of_rays(paths: RayPaths, plane: Rectangle, film: Film) -> Pixels:
-    """From where the rays of all pixels landed on `plane`."""
+def view_of_rays(paths: RayPaths, plane: Rectangle, film: Film) -> Pixels | None:
+    """From where the rays of all pixels landed on `plane`; None unless each pixel has one ray."""
+    if len(paths.status) != film.width * film.height:
+        return None
     along = (paths.point - np.array(plane.frame.origin)) @ np.array(plane.frame.x)
     landed = (paths.status == Status.HIT).reshape(film.height, film.width, 1)
     coarse = (along / plane.size[0] + 0.5).reshape(film.height, film.width, 1)

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner, Result
 
@@ -76,6 +77,20 @@ def scenes_with(folder: Path, **replacements: str) -> Path:
     (folder / "scenes" / "snell").mkdir(parents=True)
     (folder / "scenes" / "snell" / "sweep.toml").write_text(text)
     return folder / "scenes"
+
+
+@pytest.mark.parametrize("name", cli.main.list_commands(click.Context(cli.main)))
+def test_each_file_is_a_command_of_its_name(name: str, invoke: Invoke) -> None:
+    assert cli.main.commands == {}, "a command belongs in a file of its own"
+    result = invoke(name, "--help")
+    assert result.exit_code == 0
+    assert result.output.startswith(f"Usage: main {name} ")
+
+
+def test_an_unknown_command_is_bad_usage(invoke: Invoke) -> None:
+    result = invoke("rum")
+    assert result.exit_code == 2
+    assert "No such command 'rum'" in result.output
 
 
 # --- run: exit codes ------------------------------------------------------------------------------

@@ -1,0 +1,75 @@
+"""Options that several commands share, and what they select."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from harness.plan import PreparedCase
+    from harness.renderers.base import Renderer
+    from harness.scene.load import LoadedCase
+
+DEFAULT_OUT = Path("reports/latest")
+
+scenes_option = click.option(
+    "--scenes",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of scene files instead of the built-in suite.",
+)
+quality_option = click.option(
+    "--quality", type=click.Choice(["draft", "normal", "high"]), default="normal",
+    show_default=True, help="Image size and samples.",
+)  # fmt: skip
+renderer_option = click.option(
+    "--renderer", "-r", "renderers", multiple=True, metavar="NAME", help="Only these."
+)
+command_option = click.option(
+    "--renderer-command", "commands", multiple=True, metavar="TEMPLATE",
+    help='An executable of your own: "mytracer {scene} {output}". May be given several times.',
+)  # fmt: skip
+config_option = click.option(
+    "--renderer-config", "configs", multiple=True, type=click.Path(path_type=Path, dir_okay=False),
+    help="A snellcheck-renderer.toml that describes a renderer of your own.",
+)  # fmt: skip
+
+
+def loaded_cases(
+    selection: Sequence[str],
+    quality: str,
+    scenes: Path | None,
+    renderers: Sequence[str] = (),
+) -> list[LoadedCase]:
+    """The cases that the selection names. Raises InputError where a scene is wrong."""
+    from harness.data import scenes_root
+    from harness.scene.load import find
+
+    return find(selection, scenes or scenes_root(), quality, renderers)
+
+
+def prepared_cases(
+    selection: Sequence[str],
+    quality: str,
+    scenes: Path | None,
+    renderers: Sequence[str] = (),
+) -> list[PreparedCase]:
+    """The cases that the selection names, with their resolved scenes."""
+    from harness.plan import prepare
+
+    return [prepare(case) for case in loaded_cases(selection, quality, scenes, renderers)]
+
+
+def chosen_renderers(
+    names: Sequence[str], commands: Sequence[str], configs: Sequence[Path]
+) -> list[Renderer]:
+    """Those named; without names the built-in ones, and in any case the user's own."""
+    from harness.renderers import registry
+
+    own = [registry.command_renderer(template) for template in commands]
+    own += [registry.configured_renderer(path) for path in configs]
+    chosen = list(names) or sorted(registry.available())
+    return [*(registry.create(name) for name in chosen), *own]
