@@ -74,11 +74,17 @@ class _Front:
 
 
 def branches(
-    form: ClosedForm, rays: Rays, depth: int, min_weight: float = 0.0, along: str | None = None
+    form: ClosedForm,
+    rays: Rays,
+    depth: int,
+    min_weight: float = 0.0,
+    along: str | None = None,
+    partial: bool = True,
 ) -> Iterator[Branch]:
     """All branches of at most `depth` segments and at least `min_weight`, depth first.
 
-    With `along`, only those that start as it does.
+    With `along`, only those that start as it does; without `partial`, only those that are reflected
+    where all light is.
     """
     inside = form.enclosed(rays)
     m = len(rays.origins)
@@ -100,13 +106,13 @@ def branches(
         if len(front.path) + 1 >= depth or not goes_on.any():
             continue
         met = Interface(met.t[goes_on], met.n[goes_on], met.which[goes_on], met.beyond[goes_on])
-        for child in _split(form, front.take(goes_on), met):
+        for child in _split(form, front.take(goes_on), met, partial):
             child = child.take(child.weight > min_weight) if min_weight else child
             if len(child.rows) and (along is None or along.startswith(child.path)):
                 waiting.append(child)
 
 
-def _split(form: ClosedForm, front: _Front, met: Interface) -> tuple[_Front, _Front]:
+def _split(form: ClosedForm, front: _Front, met: Interface, partial: bool) -> tuple[_Front, _Front]:
     """Both rays that each ray becomes at its interface; one where there is total reflection."""
     ior = np.array([medium.ior for medium in form.scene.media])
     sigma = np.array([medium.absorption for medium in form.scene.media])
@@ -118,7 +124,7 @@ def _split(form: ClosedForm, front: _Front, met: Interface) -> tuple[_Front, _Fr
     bent, total = refract(front.d, met.n, ior_i, ior_t)
     back = reflect(front.d, met.n)
     r, t = _amplitudes(cos_i, ior_i, ior_t)
-    everyone = np.ones(len(o), bool)
+    everyone = np.full(len(o), partial)
 
     def child(letter: str, d: Float, weight: Float, amplitude: Complex, crosses: bool) -> _Front:
         inside = front.inside.copy()
@@ -129,7 +135,7 @@ def _split(form: ClosedForm, front: _Front, met: Interface) -> tuple[_Front, _Fr
         return _Front(
             front.path + letter, front.rows, o, d, inside, medium, front.weight * weight, absorbed,
             field,
-        ).take(~total if crosses else everyone)  # fmt: skip
+        ).take(~total if crosses else everyone | total)  # fmt: skip
 
     return child("R", back, reflectance, r, False), child("T", bent, 1 - reflectance, t, True)
 
@@ -202,9 +208,19 @@ class AllLight:
 
 
 def light_on(
-    form: ClosedForm, rays: Rays, plane: Rectangle, depth: int, min_weight: float
+    form: ClosedForm,
+    rays: Rays,
+    plane: Rectangle,
+    depth: int,
+    min_weight: float,
+    n2: bool = False,
 ) -> AllLight:
-    """The radiance that rays see of `plane` shining with radiance 1, by all paths together."""
+    """The radiance that rays see of `plane` shining with radiance 1, by all paths together.
+
+    `n2`: radiance scales with the square of the index of the medium that it is in.
+    """
+    ior = np.array([medium.ior for medium in form.scene.media])
+    per_medium = (ior[form.scene.camera.medium] / ior) ** 2 if n2 else np.ones(len(ior))
     m = len(rays.origins)
     level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     for branch in branches(form, rays, depth, min_weight):
@@ -214,8 +230,9 @@ def light_on(
         on = landing.status == Status.HIT
         ends = on | ~np.isfinite(branch.ahead)
         rows = branch.rows[on]
-        level[rows] += branch.weight[on, None] * landing.transmission[on]
-        natural[rows] += branch.natural[on, None] * landing.transmission[on]
+        left = landing.transmission[on] * per_medium[branch.medium[on]][:, None]
+        level[rows] += branch.weight[on, None] * left
+        natural[rows] += branch.natural[on, None] * left
         followed[branch.rows[ends]] += branch.weight[ends]
     return AllLight(level, natural, 1 - followed)
 

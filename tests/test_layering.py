@@ -35,7 +35,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight"),
     ("report",),
-    ("plan", "results", "pairs", "judge", "packing", "archive", "lanes", "run"),
+    ("plan", "results", "probed", "pairs", "judge", "packing", "archive", "lanes", "run"),
     ("doctor",),
     ("show", "cli"),
 )

@@ -67,6 +67,11 @@ class Observable(enum.StrEnum):
     APLANATIC_IMAGE = "aplanatic_image", "units", "image distance of a sphere's aplanatic point"
     RAINBOW_ANGLE = "rainbow_angle", "deg", "angle of a rainbow from the point opposite to the sun"
     OPTICAL_LENGTH = "optical_length", "units", "optical length of the path: sum of index x way"
+    VARIANT_AGREEMENT = (
+        "variant_agreement",
+        "units",
+        "landing points in a variant of a case against those in the case itself",
+    )
     RAY_AGREEMENT = "ray_agreement", "units", "a ray API's landing points against coded images"
 
     # Light.
@@ -117,3 +122,6 @@ RAY_API_OBSERVABLES = frozenset({Observable.OPTICAL_LENGTH, Observable.RAY_AGREE
 
 # Observables of a single renderer, which have a truth; all others compare two pictures.
 TRUTH_OBSERVABLES = frozenset(Observable) - IMAGE_OBSERVABLES | {Observable.RADIANCE}
+
+# Observables that follow from others and are not asked for by name.
+IMPLIED_OBSERVABLES = frozenset({Observable.VARIANT_AGREEMENT})

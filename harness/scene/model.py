@@ -308,6 +308,18 @@ class Probe(Strict):
     cells: Annotated[int, Field(ge=1, le=16383)] = 4095
 
 
+class Variant(Placed):
+    """The same case in another form, of which every probe must show the same.
+
+    `shapes` replaces those of the solids it names; then everything, camera and planes too, is
+    turned by `rotate` about the origin and made `scale` times as large.
+    """
+
+    name: Name
+    shapes: dict[Name, SolidShape] = {}
+    scale: Positive = 1.0
+
+
 # --- checks ---------------------------------------------------------------------------------------
 
 
@@ -315,12 +327,15 @@ class Known(Strict):
     """A documented deviation of a renderer: KNOWN while its size stays in [at_least, at_most].
 
     When it is gone the check fails, because the scene is out of date; `at_least` 0 says that it
-    shows in some permutations only.
+    shows in some permutations only. `astray` is how many rays may be lost by it, or come where none
+    should. With `variants` it is about these alone; sizes are those in the case's own units.
     """
 
     renderer: str
     at_least: Finite
     at_most: Finite
+    astray: Annotated[int, Field(ge=0)] = 0
+    variants: tuple[Name, ...] = ()
     cause: Annotated[str, Field(min_length=10)]
 
 
@@ -368,5 +383,6 @@ class Case(Strict):
     lights: tuple[PointLight, ...] = ()
     transport: Transport = Transport()
     probes: tuple[Probe, ...] = ()
+    variants: tuple[Variant, ...] = ()
     checks: Annotated[tuple[CheckSpec, ...], Field(min_length=1)]
     tables: tuple[Table, ...] = ()
