@@ -87,6 +87,7 @@ class Archive:
             differences=self._differences(name, contenders, results),
             tables=[Table.model_validate(t.model_dump(mode="json")) for t in loaded.model.tables],
             files={"scene.json": f"scenes/{name}.json"},
+            diagnoses=judgement.diagnoses,
             pack=pack,
         )
         record.write(written, self.root / "records" / f"{name}.json")

@@ -61,11 +61,13 @@ class InputError(SnellcheckError):
 
 
 class RendererError(SnellcheckError):
-    """A renderer did not deliver. `log` is the tail of what it said."""
+    """A renderer did not deliver. `log` is the tail of what it said, `remedy` a command that
+    mends it.
+    """
 
-    def __init__(self, message: str, *, log: str = "") -> None:
+    def __init__(self, message: str, *, log: str = "", remedy: str = "") -> None:
         super().__init__(message)
-        self.log = log
+        self.log, self.remedy = log, remedy
 
 
 class RendererMissing(RendererError):

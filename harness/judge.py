@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from harness import plan
+from harness.attribution import attributed
+from harness.explain import Explainer
 from harness.measure import (
     flat_observables,
     focus_observables,
@@ -30,7 +32,7 @@ from harness.measure.raymap import ProbeRays
 from harness.pairs import PairJudge
 from harness.plan import Form, PreparedCase
 from harness.probed import Probed
-from harness.record import Check, Curve, Verdict
+from harness.record import Check, Curve, Diagnosis, Verdict
 from harness.renderers.base import Capability
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
@@ -72,7 +74,7 @@ BOUNDARIES = {
 
 @dataclass
 class Judgement:
-    """All checks of a case in the order of its scene file, and the curves they drew.
+    """All checks of a case in the order of its scene file, their curves, and why who is off.
 
     `rays` are those that were measured on the way, probe by probe.
     """
@@ -80,6 +82,7 @@ class Judgement:
     checks: list[Check] = field(default_factory=list)
     curves: list[Curve] = field(default_factory=list)
     rays: list[ProbeRays] = field(default_factory=list)
+    diagnoses: list[Diagnosis] = field(default_factory=list)
 
 
 class CaseJudge:
@@ -105,7 +108,17 @@ class CaseJudge:
                     judgement.checks += self._in_all_forms(spec, contender, judgement.curves)
             else:
                 judgement.checks += self._pairs.checks(spec, contenders, self._contenders)
-        judgement.rays = list(self._probed.measured())
+        judgement.checks = attributed(judgement.checks)
+        base, probed = self._probed.forms[0], self._probed
+        explainer = Explainer(
+            self._case,
+            self._results,
+            lambda probe: probed.truth(probe, base),
+            lambda contender, probe: probed.rays(contender, probe, base),
+        )
+        found = (explainer.explain(c, judgement.checks) for c in self._contenders)
+        judgement.diagnoses = [diagnosis for diagnosis in found if diagnosis is not None]
+        judgement.rays = list(probed.measured())
         return judgement
 
     def _asked(self, spec: model.CheckSpec) -> Iterator[Contender]:

@@ -52,6 +52,10 @@ class Probed:
         paths = self._results.get(contender, plan.trace_role(probe, form.name))
         if not isinstance(paths, RayPaths):
             raise NotAvailable(Verdict.ERROR, "the trace delivered an image")
+        got, wanted = len(paths.status), len(self.truth(probe, form).grazing)
+        if got != wanted:
+            reason = f"the trace delivered {got} of {wanted} rays"
+            raise NotAvailable(Verdict.ERROR, reason)
         return from_paths(paths)
 
     def coded(self, contender: Contender, probe: model.Probe, form: Form) -> RayMeasurement:

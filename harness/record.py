@@ -45,6 +45,19 @@ class Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
+class Attribution(Model):
+    """Who is off, where a check compares two renderers or one with the truth.
+
+    `how` is "truth" where a closed form decides, "agreement" where the renderers' majority does, or
+    "undecided"; `confidence` is the probability that `off` are those who are wrong.
+    """
+
+    off: list[str]
+    how: str
+    confidence: float
+    sentence: str
+
+
 class Check(Model):
     """One comparison. `value` is compared with `expected` within `tolerance`.
 
@@ -65,6 +78,58 @@ class Check(Model):
     reason: str
     derivation: str = ""
     detail: dict[str, float | int | str] = Field(default_factory=dict)
+    attribution: Attribution | None = None
+
+
+class Cause(Model):
+    """A known cause with its fitted parameter: what the renderer does, as `sentence` says.
+
+    `residual` is what it leaves of the deviation (root mean square, in units of the tolerances; 1
+    is perfect), `explains` the share of the deviation that it takes away.
+    """
+
+    id: str
+    sentence: str
+    parameter: str = ""
+    value: float | None = None
+    uncertainty: float | None = None  # two standard errors
+    unit: str = ""
+    residual: float
+    explains: float
+
+
+class CauseFit(Model):
+    """How well one cause fits one case, from which the cause of a whole run is computed.
+
+    `score` is its cost (see `harness.diagnosis.fit`), which grows by `information` / 2 times the
+    square of a change of the first of `values`. The one without an id is the truth's.
+    """
+
+    id: str
+    values: list[float]
+    score: float
+    information: float
+    fits: bool
+
+
+class Diagnosis(Model):
+    """Why a renderer is off, in one case or, with `cases`, in all of a run.
+
+    `cause` is None where none of the known causes fits, and `sentence` says so. `deviation` is the
+    size of what is to be explained, in units of the tolerances, `rays` how many rays tell of it.
+    `cases` are those that the cause explains, `unexplained` those that it does not.
+    """
+
+    renderer: str
+    sentence: str
+    cause: Cause | None = None
+    runner_up: Cause | None = None
+    deviation: float = 0.0
+    rays: int = 0
+    iors: list[float] = Field(default_factory=list)
+    fits: list[CauseFit] = Field(default_factory=list)
+    cases: list[str] = Field(default_factory=list)
+    unexplained: list[str] = Field(default_factory=list)
 
 
 class ImageFile(Model):
@@ -181,6 +246,7 @@ class CaseRecord(Model):
     differences: list[DifferenceMap] = Field(default_factory=list)
     tables: list[Table] = Field(default_factory=list)
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: scene.json …
+    diagnoses: list[Diagnosis] = Field(default_factory=list)  # of renderers that are off here
     pack: str | None = None  # relative path: pixels and rays as numbers, for the report's pages
 
     model_config = ConfigDict(
@@ -213,6 +279,7 @@ class SummaryCase(Model):
     family: str
     status: Verdict
     checks: list[Check]
+    diagnoses: list[Diagnosis] = Field(default_factory=list)
 
 
 class Summary(Model):
@@ -228,6 +295,7 @@ class Summary(Model):
     renderers: dict[str, RendererSummary]
     counts: Counts
     cases: list[SummaryCase]
+    diagnoses: list[Diagnosis] = Field(default_factory=list)  # one per renderer that is off
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"

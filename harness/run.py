@@ -12,6 +12,7 @@ from pathlib import Path
 from harness import __version__, plan, record
 from harness.archive import Archive
 from harness.errors import InputError
+from harness.explain import explain_run
 from harness.judge import CaseJudge
 from harness.lanes import Calibrated, Done, Event, Lane
 from harness.pairs import camera_shift
@@ -180,8 +181,9 @@ class _Session:
             quality=self.quality, started=self.started, wall_s=time.perf_counter() - state.started,
         )  # fmt: skip
         self.finished[index] = SummaryCase(
-            id=written.id, family=written.family, status=written.status, checks=written.checks
-        )
+            id=written.id, family=written.family, status=written.status, checks=written.checks,
+            diagnoses=written.diagnoses,
+        )  # fmt: skip
         state.results.clear()
 
     def summary(self, command: str) -> Summary:
@@ -197,6 +199,7 @@ class _Session:
             renderers={name: self._renderer_summary(name) for name in self.names},
             counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
             cases=cases,
+            diagnoses=explain_run([state.case for state in self.states], cases, self.names),
         )
 
     def _renderer_summary(self, name: str) -> RendererSummary:

@@ -73,6 +73,8 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
             if renderer.remedy:
                 console.print(f"  mend it with: [bold]{escape(renderer.remedy)}[/]")
     _problems(summary, console)
+    for diagnosis in summary.diagnoses:
+        console.print(f"[bold]Diagnosis[/] {escape(diagnosis.sentence)}")
     counts = Counter(c.status for case in summary.cases for c in case.checks)
     said = ", ".join(f"[{STYLE[v]}]{counts[v]} {v.value}[/]" for v in Verdict)
     console.print(f"{sum(counts.values())} checks in {summary.wall_s:.1f} s: {said}")

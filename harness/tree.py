@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from harness.expected import Float, fresnel, reflect, refract
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Rectangle
-from harness.truth import ClosedForm, Interface
+from harness.truth import Boundary, ClosedForm
 
 Complex = NDArray[np.complex128]
 
@@ -105,14 +105,14 @@ def branches(
         goes_on = np.isfinite(met.t)
         if len(front.path) + 1 >= depth or not goes_on.any():
             continue
-        met = Interface(met.t[goes_on], met.n[goes_on], met.which[goes_on], met.beyond[goes_on])
+        met = Boundary(met.t[goes_on], met.n[goes_on], met.which[goes_on], met.beyond[goes_on])
         for child in _split(form, front.take(goes_on), met, partial):
             child = child.take(child.weight > min_weight) if min_weight else child
             if len(child.rows) and (along is None or along.startswith(child.path)):
                 waiting.append(child)
 
 
-def _split(form: ClosedForm, front: _Front, met: Interface, partial: bool) -> tuple[_Front, _Front]:
+def _split(form: ClosedForm, front: _Front, met: Boundary, partial: bool) -> tuple[_Front, _Front]:
     """Both rays that each ray becomes at its interface; one where there is total reflection."""
     ior = np.array([medium.ior for medium in form.scene.media])
     sigma = np.array([medium.absorption for medium in form.scene.media])

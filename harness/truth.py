@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.chord import Body, Chord
-from harness.expected import Float, fresnel, reflect, refract
+from harness.chord import Body
+from harness.expected import Float, reflect
+from harness.intervals import Chord
+from harness.law import PHYSICS, Interface, Law, Leg
 from harness.renderers.base import Rays, Status
-from harness.scene.resolved import Rectangle, ResolvedScene
+from harness.scene.resolved import Mesh, Rectangle, ResolvedScene
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Landing:
 
 
 @dataclass(frozen=True)
-class Interface:
+class Boundary:
     """The next boundary on each of m rays: distance `t` (infinite where there is none), normal `n`
     facing the ray, index `which` of its solid, and the medium `beyond` it.
     """
@@ -70,15 +72,19 @@ class Interface:
 
 
 class ClosedForm:
-    """A scene prepared for exact tracing. Raises ValueError where it has no closed form."""
+    """A scene prepared for exact tracing. Raises ValueError where it has no closed form.
 
-    def __init__(self, scene: ResolvedScene) -> None:
-        self.scene = scene
+    `law` is physics, or what a renderer might do in its place.
+    """
+
+    def __init__(self, scene: ResolvedScene, law: Law = PHYSICS) -> None:
+        self.scene, self.law = scene, law
         self._bodies = [Body(solid) for solid in scene.solids]
+        self._meshes = np.array([isinstance(s.shape, Mesh) for s in scene.solids] or [False])
 
     def follow(self, rays: Rays, path: str) -> TruePaths:
         """Rays from the camera along `path`."""
-        scene, bodies = self.scene, self._bodies
+        scene, bodies, law = self.scene, self._bodies, self.law
         m, count = len(rays.origins), len(path)
         rows = np.arange(m)
         o, d = rays.origins.copy(), rays.directions.copy()
@@ -88,49 +94,51 @@ class ClosedForm:
         interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
         ior = np.array([medium.ior for medium in scene.media])
         sigma = np.array([medium.absorption for medium in scene.media])
-        chords = [body.chord(o, d) for body in bodies]
-        within = [(c.t_in < 0) & (c.t_out > 0) for c in chords]
-        inside = np.array(within, bool).reshape(len(bodies), m)
+        chords = [body.chords(o, d) for body in bodies]
+        inside = _enclosing(chords, m)
         medium = np.full(m, scene.camera.medium, np.intp)
 
         for k, letter in enumerate(path):
             if k:
-                chords = [body.chord(o, d) for body in bodies]
+                chords = [body.chords(o, d) for body in bodies]
             t, n, which = _next_interface(chords, inside)
             status[(status == Status.HIT) & ~np.isfinite(t)] = Status.MISS
             live = status == Status.HIT
             t = np.where(live, t, 0.0)
             o = o + t[:, None] * d
-            absorbed += t[:, None] * sigma[medium]
-            facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
-            beyond = np.where(
-                live, _beyond(bodies, which, inside[which, rows] if bodies else live), 0
-            )
-            c = np.clip(-np.einsum("ij,ij->i", d, facing), 0, 1)
-            reflectance = fresnel(c, ior[medium], ior[beyond])
+            start = normals[:, k - 1] if k else None
+            absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
+            facing = law.normal(np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n))
+            leaving = inside[which, rows] if bodies else live
+            beyond = np.where(live, _beyond(bodies, which, leaving), 0)
+            at = Interface(o, d, facing, ior[medium], ior[beyond], ~leaving, t, self._meshes[which])
+            c, reflectance = at.cos_theta_i, law.reflectance(at)
             cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
             if letter == "R":
                 weight *= np.where(live, reflectance, 1.0)
                 d = np.where(live[:, None], reflect(d, facing), d)
+                o = law.start(at, d)
                 continue
             eta[:, k] = ior[medium] / ior[beyond]
-            bent, total = refract(d, facing, ior[medium], ior[beyond])
+            bent, total = law.bend(at)
             status[live & total] = Status.TIR
             live &= ~total
-            weight *= np.where(live, 1 - reflectance, 1.0)
+            weight *= np.where(live, law.transmittance(at, reflectance), 1.0)
             d = np.where(live[:, None], bent, d)
+            o = law.start(at, d)
             inside[which[live], np.flatnonzero(live)] ^= True
             medium = np.where(live, beyond, medium)
-        ahead, _, _ = _next_interface([body.chord(o, d) for body in bodies], inside)
+        ahead, _, _ = _next_interface([body.chords(o, d) for body in bodies], inside)
         return TruePaths(
             status, o, d, medium, weight, absorbed, cos_i, eta, interface, normals, inside, ahead
         )
 
     def land(self, paths: TruePaths, plane: Rectangle) -> Landing:
         """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
+        start = paths.n[:, -1] if paths.n.shape[1] else None
         return self.meet(
             plane, paths.origin, paths.direction, paths.ahead, paths.medium, paths.absorbed,
-            paths.status,
+            paths.status, start,
         )  # fmt: skip
 
     def meet(
@@ -142,8 +150,12 @@ class ClosedForm:
         medium: NDArray[np.intp],
         absorbed: Float,
         status: NDArray[np.int8] | None = None,
+        start: Float | None = None,
     ) -> Landing:
-        """The same for rays from `o` along `d`, each (m, 3), whose next interface is `ahead`."""
+        """The same for rays from `o` along `d`, each (m, 3), whose next interface is `ahead`.
+
+        `start` is the normal of the interface that they come from.
+        """
         frame = plane.frame
         status = np.full(len(o), Status.HIT, np.int8) if status is None else status.copy()
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -157,48 +169,54 @@ class ClosedForm:
         landed = status == Status.HIT
         point[~landed] = np.nan
         sigma = np.array([medium.absorption for medium in self.scene.media])
-        depth = absorbed + np.where(landed, t, 0.0)[:, None] * sigma[medium]
+        leg = Leg(np.where(landed, t, 0.0), d, sigma[medium], start, "")
+        depth = absorbed + self.law.depth(leg)
         return Landing(status, point, np.exp(-depth))
 
     def enclosed(self, rays: Rays) -> NDArray[np.bool_]:
         """(solids, m) which solids the rays start in."""
-        chords = [body.chord(rays.origins, rays.directions) for body in self._bodies]
-        within = [(c.t_in < 0) & (c.t_out > 0) for c in chords]
-        return np.array(within, bool).reshape(len(self._bodies), len(rays.origins))
+        chords = [body.chords(rays.origins, rays.directions) for body in self._bodies]
+        return _enclosing(chords, len(rays.origins))
 
-    def next_interface(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Interface:
+    def next_interface(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Boundary:
         """The next boundary of rays from `o` along `d` that are in the solids `inside`."""
-        chords = [body.chord(o, d) for body in self._bodies]
+        chords = [body.chords(o, d) for body in self._bodies]
         t, n, which = _next_interface(chords, inside)
         rows = np.arange(len(o))
         leaving = inside[which, rows] if self._bodies else np.zeros(len(o), bool)
         facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
-        return Interface(t, facing, which, _beyond(self._bodies, which, leaving))
+        return Boundary(t, facing, which, _beyond(self._bodies, which, leaving))
+
+
+def _enclosing(chords: list[list[Chord]], m: int) -> NDArray[np.bool_]:
+    """(solids, m) which solids lines start in."""
+    within = [np.any([(c.t_in < 0) & (c.t_out > 0) for c in parts], axis=0) for parts in chords]
+    return np.array(within, bool).reshape(len(chords), m)
 
 
 def _next_interface(
-    chords: list[Chord], inside: NDArray[np.bool_]
+    chords: list[list[Chord]], inside: NDArray[np.bool_]
 ) -> tuple[Float, Float, NDArray[np.intp]]:
     """Distance, outward normal and solid of the next boundary; infinite where there is none.
 
-    Which root of a solid counts is known from whether the ray is inside it, so no distance has to
+    Which roots of a solid count is known from whether the ray is inside it, so no distance has to
     be thresholded and a slab of any thinness is seen.
     """
     m = inside.shape[1]
-    if not chords:
-        return np.full(m, np.inf), np.zeros((m, 3)), np.zeros(m, np.intp)
-    candidates = np.array(
-        [
-            np.where(within, c.t_out, np.where((c.t_in > 0) & (c.t_in < c.t_out), c.t_in, np.inf))
-            for c, within in zip(chords, inside, strict=True)
-        ]
-    )
-    nearest = candidates.argmin(0)
-    rows = np.arange(m)
-    n = np.array(
-        [np.where(w[:, None], c.n_out, c.n_in) for c, w in zip(chords, inside, strict=True)]
-    )
-    return candidates[nearest, rows], n[nearest, rows], nearest
+    best, normal, which = np.full(m, np.inf), np.zeros((m, 3)), np.zeros(m, np.intp)
+    for k, (parts, within) in enumerate(zip(chords, inside, strict=True)):
+        for c in parts:
+            there = c.t_in < c.t_out
+            if len(parts) == 1:  # convex: whoever is inside leaves by its one exit
+                leaves = np.where(within, c.t_out, np.inf)
+            else:
+                leaves = np.where(within & there & (c.t_out > 0), c.t_out, np.inf)
+            t = np.where(within, leaves, np.where(there & (c.t_in > 0), c.t_in, np.inf))
+            nearer = t < best
+            best = np.where(nearer, t, best)
+            n = np.where(within[:, None], c.n_out, c.n_in)
+            normal, which = np.where(nearer[:, None], n, normal), np.where(nearer, k, which)
+    return best, normal, which
 
 
 def _beyond(

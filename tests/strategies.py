@@ -53,7 +53,7 @@ def rotations() -> st.SearchStrategy[list[Document]]:
 
 @cache
 def convex_shapes() -> st.SearchStrategy[Document]:
-    """Boxes, slabs and prisms within 6 units of their place."""
+    """Boxes, slabs, prisms and wedges within 6 units of their place."""
     sizes = numbers(0.1, 3)
     place = {"center": points(2)}
     turn = {"rotate": rotations()}
@@ -72,7 +72,52 @@ def convex_shapes() -> st.SearchStrategy[Document]:
         "side": sizes,
         "length": sizes,
     }
-    return st.one_of(*(st.fixed_dictionaries(keys, optional=turn) for keys in (box, slab, prism)))
+    wedge = {
+        "type": st.just("wedge"),
+        "thickness": numbers(1.0, 3),
+        "angle": numbers(0, 30),  # 1.5 tan 30 is less than 1
+        "size": st.tuples(numbers(0.1, 3), numbers(0.1, 3)).map(list),
+        **place,
+    }
+    kinds = (box, slab, prism, wedge)
+    return st.one_of(*(st.fixed_dictionaries(keys, optional=turn) for keys in kinds))
+
+
+@cache
+def lenses() -> st.SearchStrategy[Document]:
+    """Lenses of all kinds: no face bends by more than half a unit, and none is thinner than one."""
+    radii = st.one_of(numbers(1.5, 20), numbers(-20, -1.5), st.just(math.inf))
+    return st.fixed_dictionaries(
+        {
+            "type": st.just("lens"),
+            "axis": directions(),
+            "thickness": numbers(1, 3),
+            "radii": st.tuples(radii, radii).map(list),
+            "diameter": numbers(0.2, 2),
+        },
+        optional={
+            "vertex": points(2),
+            "conics": st.tuples(numbers(-3, 0.5), numbers(-3, 0.5)).map(list),
+            "rotate": rotations(),
+        },
+    )
+
+
+@cache
+def cones() -> st.SearchStrategy[Document]:
+    return st.fixed_dictionaries(
+        {
+            "type": st.just("cone"),
+            "axis": directions(),
+            "radius": numbers(1, 2),
+            "height": numbers(0.1, 3),
+        },
+        optional={
+            "top_radius": numbers(0, 1),
+            "center": points(2),
+            "rotate": rotations(),
+        },
+    )
 
 
 @cache
@@ -101,7 +146,7 @@ def solid_shapes() -> st.SearchStrategy[Document]:
         ),
     )
     polygons = convex_shapes().map(lambda shape: {"type": "polygons", "of": shape})
-    return st.one_of(round_ones, convex_shapes(), polygons)
+    return st.one_of(round_ones, lenses(), cones(), convex_shapes(), polygons)
 
 
 @cache
@@ -248,7 +293,7 @@ def _inline(value: object) -> str:
         case bool():
             return "true" if value else "false"
         case int() | float():
-            return repr(value)
+            return repr(value)  # "inf" is TOML, too
         case str():
             return _text(value)
         case list():

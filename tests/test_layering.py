@@ -23,19 +23,23 @@ ROOT = Path(__file__).resolve().parent.parent
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
     ("errors", "data", "cores"),
-    ("record", "imagefile", "expected", "expected_systems", "measure.observables"),
+    ("record", "imagefile", "expected", "expected_systems", "law", "measure.observables"),
     ("scene",),
     ("renderers.base",),
+    ("intervals",),
+    ("lens_chord",),
     ("camera", "chord", "section", "translate"),
     ("truth",),
     ("tree",),
     ("renderers",),
     ("probe",),
     ("measure",),
+    ("diagnosis",),
     ("chart",),
-    ("verdict", "preflight"),
+    ("verdict", "preflight", "attribution"),
     ("report",),
-    ("plan", "results", "probed", "pairs", "judge", "packing", "archive", "lanes", "run"),
+    ("plan", "results", "probed", "pairs", "explain", "judge"),
+    ("packing", "archive", "lanes", "run"),
     ("doctor",),
     ("show", "cli"),
 )
@@ -182,7 +186,7 @@ def test_reports_know_only_records(file: str) -> None:
     assert not [str(i) for i in imports_of(file) if i.stage not in allowed]
 
 
-@pytest.mark.parametrize("file", ["expected", "truth", "chord"])
+@pytest.mark.parametrize("file", ["expected", "law", "truth", "chord"])
 def test_truth_knows_neither_the_tracer_nor_any_renderer(file: str) -> None:
     imports = imports_of(f"harness/{file}.py")
     assert not [str(i) for i in imports if i.package == "tracer"]

@@ -24,12 +24,13 @@ from tracer.scene import (
     ThinSlab,
     Translucent,
 )
-from tracer.shapes import COLUMNS, Cell, Disk, Rectangle, Sphere, bound_row, face_row
+from tracer.shapes import COLUMNS, Disk, Rectangle, Sphere, bound_row, face_row
+from tracer.solids import Cell, Compound, compound_rows
 
 Floats = NDArray[np.float64]
 
 # Kinds of shapes, and of what they bound.
-SPHERE, CELL, MESH, RECTANGLE, DISK = range(5)
+SPHERE, CELL, COMPOUND, MESH, RECTANGLE, DISK = range(6)
 DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
@@ -40,7 +41,7 @@ class Arrays(NamedTuple):
     """One row of `objects`, `balls` and `materials` per solid, then per surface."""
 
     objects: NDArray[np.int64]  # (n, 8)
-    balls: Floats  # (n, 4): centre and squared radius of a sphere around a cell
+    balls: Floats  # (n, 4): centre and squared radius of a sphere around it
     materials: Floats  # (n, 7): two colours and a thickness
     rows: Floats  # shapes
     media: Floats  # (m, 4): ior, absorption
@@ -131,6 +132,11 @@ class _Flattener:
                 kind, count = CELL, len(bounds)
                 ball = [*center, radius * radius * (1.0 + 1e-9)]
                 self.rows += [bound_row(bound) for bound in bounds]
+            case Compound(where, center, radius):
+                rows = compound_rows(where)
+                kind, count = COMPOUND, len(rows)
+                ball = [*center, radius * radius * (1.0 + 1e-9)]
+                self.rows += rows
             case Rectangle() | Disk():
                 kind = DISK if isinstance(shape, Disk) else RECTANGLE
                 self.rows.append(face_row(shape))

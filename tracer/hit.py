@@ -6,6 +6,7 @@ import numpy as np
 
 from tracer.arrays import (
     CELL,
+    COMPOUND,
     COUNT,
     DISK,
     FIRST,
@@ -19,9 +20,11 @@ from tracer.arrays import (
 from tracer.compiled import inlined
 from tracer.mesh import STACK, mesh_hit, smooth_normal, triangle_normal
 from tracer.shapes import (
+    HOLLOW,
     INF,
     bound_normal,
     cell_stretch,
+    compound_hit,
     face_distance,
     sphere_normal,
     sphere_stretch,
@@ -32,9 +35,10 @@ from tracer.vector import Vec, along, dot, scale, sub
 NOTHING = -1
 
 
-def new_stack() -> Floats:
-    """Room for walking down meshes' trees; one per thread."""
-    return np.empty((STACK, 2))
+def new_stack(scene: Arrays) -> Floats:
+    """Room for walking down meshes' trees and for the bounds of compounds; one per thread."""
+    most = scene.objects[:, COUNT][scene.objects[:, SHAPE] == COMPOUND].max(initial=0)
+    return np.empty((max(STACK, int(most)), 2))
 
 
 @inlined
@@ -63,6 +67,8 @@ def nearest_hit(
                 o, d, scene.nodes, scene.links, scene.triangles, root, on_face, side, best, stack
             )
             entering = side > 0
+        elif kind == COMPOUND:
+            t, face, entering = _compound_hit(scene, i, o, d, on_face, inward, stack)
         elif on_face >= 0 and not (inward and kind <= CELL):
             continue  # nothing of a convex solid lies outwards; a face is not met twice
         elif kind == SPHERE:
@@ -93,12 +99,17 @@ def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[fl
 
 
 @inlined
+def _far_from_ball(scene: Arrays, i: int, o: Vec, d: Vec) -> bool:
+    """Whether the ray's line misses the sphere around object `i`."""
+    to_center = sub(vec_at(scene.balls, i, 0), o)
+    ahead = dot(to_center, d)
+    return bool(dot(to_center, to_center) - ahead * ahead > scene.balls[i, 3])
+
+
+@inlined
 def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
-    if on_face < 0:
-        to_center = sub(vec_at(scene.balls, i, 0), o)
-        ahead = dot(to_center, d)
-        if dot(to_center, to_center) - ahead * ahead > scene.balls[i, 3]:
-            return INF, -1, False
+    if on_face < 0 and _far_from_ball(scene, i, o, d):
+        return INF, -1, False
     enter, face_in, leave, face_out = cell_stretch(
         o, d, scene.rows, scene.objects[i, FIRST], scene.objects[i, COUNT], on_face
     )
@@ -109,6 +120,16 @@ def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[floa
     if enter > 0.0:
         return enter, face_in, True
     return leave, face_out, False
+
+
+@inlined
+def _compound_hit(
+    scene: Arrays, i: int, o: Vec, d: Vec, on_face: int, inward: bool, stack: Floats
+) -> tuple[float, int, bool]:
+    if on_face < 0 and _far_from_ball(scene, i, o, d):
+        return INF, -1, False
+    first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
+    return compound_hit(o, d, scene.rows, first, count, on_face, inward, stack)
 
 
 @inlined
@@ -132,7 +153,11 @@ def hit_point(
         n = sphere_normal(p, center, scene.rows[first, 3])
         p = along(center, scene.rows[first, 3], n)  # back onto the sphere, to the last bit
     elif kind == CELL:
-        n = bound_normal(p, scene.rows, first + face)
+        n = bound_normal(p, scene.rows, face)
+    elif kind == COMPOUND:
+        n = bound_normal(p, scene.rows, face)
+        if scene.rows[face, HOLLOW] != 0.0:
+            n = scale(-1.0, n)
     elif kind == MESH:
         n = triangle_normal(scene.triangles, face)
     else:

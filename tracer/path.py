@@ -226,7 +226,7 @@ def follow(
     solids, max_depth = len(scene.solids), scene.transport.max_depth
 
     def some(begin: int, end: int) -> None:
-        _follow(arrays, solids, o, d, letters, max_depth, begin, end, found, new_stack())
+        _follow(arrays, solids, o, d, letters, max_depth, begin, end, found, new_stack(arrays))
 
     for_bands(some, n, BAND, threads)
     return found

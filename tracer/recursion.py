@@ -201,7 +201,7 @@ def render(scene: Scene, width: int, height: int, threads: int | None = None) ->
             begin,
             end,
             waiting,
-            new_stack(),
+            new_stack(arrays),
             image.pixels,
             image.cut,
             image.closest,

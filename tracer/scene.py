@@ -9,10 +9,12 @@ from tracer.camera import Orthographic, Perspective
 from tracer.errors import SceneError
 from tracer.mesh import Mesh
 from tracer.patterns import Pattern
-from tracer.shapes import Cell, Disk, Rectangle, Sphere
+from tracer.shapes import Disk, Rectangle, Sphere
+from tracer.solids import Cell, Compound
 from tracer.vector import Vec
 
-Shape = Sphere | Cell | Mesh | Rectangle | Disk
+SolidShape = Sphere | Cell | Compound | Mesh
+Shape = SolidShape | Rectangle | Disk
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ VACUUM = Medium(1.0)
 class Solid:
     """A closed shape filled with `medium`, lying wholly inside `exterior`."""
 
-    shape: Sphere | Cell | Mesh
+    shape: SolidShape
     medium: Medium
     exterior: Medium = VACUUM
     name: str = "solid"

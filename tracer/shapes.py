@@ -1,9 +1,11 @@
-"""Closed solids that a ray meets in one stretch, and open faces; intersected in closed form.
+"""What solids are bounded by, and open faces; intersected in closed form.
 
-A `Cell` is what lies inside all of its bounds: half-spaces (`Plane`) and bodies of revolution of
-second degree (`Quadric`). A box is six planes, a cylinder one quadric and two planes, a lens two
-quadrics. A ray meets every bound in one stretch from `enter` to `leave`, so it meets their
-intersection from the last `enter` to the first `leave` (T. Kay, J. Kajiya, SIGGRAPH 1986).
+A bound is convex: a half-space (`Plane`) or a body of revolution of second degree (`Quadric`). A
+ray meets it in one stretch from `enter` to `leave`. What is inside all of some bounds (a `Cell` of
+`tracer.solids`: a box, a cylinder, a lens) it meets from the last `enter` to the first `leave`
+(T. Kay, J. Kajiya, SIGGRAPH 1986). What is composed of bounds in any other way (a `Compound`) it
+enters and leaves at some of their crossings, which are looked through in turn (S. Roth, Ray casting
+for modeling solids, 1982).
 
 No ray is ever moved off the surface that it leaves. Instead it knows which face of which object
 it has left and to which side, and that face then counts as crossed at exactly t = 0.
@@ -25,12 +27,16 @@ Rows = NDArray[np.float64]
 INF = math.inf
 PLANE, QUADRIC = 0.0, 1.0
 COLUMNS = 14  # of the table that all shapes are written to
+# Of a compound's bounds: whether the solid is outside of it, and which of the compound's bounds
+# decides next, for a point inside of it and for one outside; or that all is decided.
+HOLLOW, IF_INSIDE, IF_OUTSIDE = 10, 11, 12
+INSIDE, OUTSIDE = -1, -2
 
 
 # --- what a scene is built of ---------------------------------------------------------------------
 
 
-def _require_positive(shape: object, **sizes: float) -> None:
+def require_positive(shape: object, **sizes: float) -> None:
     for name, size in sizes.items():
         if not 0.0 < size < INF:
             kind = shape if isinstance(shape, str) else type(shape).__name__.lower()
@@ -43,7 +49,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        _require_positive(self, radius=self.radius)
+        require_positive(self, radius=self.radius)
 
 
 @dataclass(frozen=True)
@@ -71,15 +77,6 @@ class Quadric:
 
 
 @dataclass(frozen=True)
-class Cell:
-    """The convex solid inside all `bounds`. The sphere `center`, `radius` encloses it."""
-
-    bounds: tuple[Plane | Quadric, ...]
-    center: Vec
-    radius: float
-
-
-@dataclass(frozen=True)
 class Rectangle:
     """Open face; `x`, `y`, `z` are orthonormal, `z` its front; `size` along x and y."""
 
@@ -90,7 +87,7 @@ class Rectangle:
     size: tuple[float, float]
 
     def __post_init__(self) -> None:
-        _require_positive(self, width=self.size[0], height=self.size[1])
+        require_positive(self, width=self.size[0], height=self.size[1])
 
 
 @dataclass(frozen=True)
@@ -102,73 +99,7 @@ class Disk:
     radius: float
 
     def __post_init__(self) -> None:
-        _require_positive(self, radius=self.radius)
-
-
-def polyhedron(planes: list[Plane], vertices: list[Vec]) -> Cell:
-    """The convex solid behind all `planes`, whose corners are `vertices`."""
-    corners = np.array(vertices, dtype=float)
-    center = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    radius = float(np.linalg.norm(corners - center, axis=1).max())
-    x, y, z = center.tolist()
-    return Cell(tuple(planes), (x, y, z), radius)
-
-
-def cylinder(center: Vec, axis: Vec, radius: float, height: float) -> Cell:
-    """Capped cylinder around `center`; `axis` is unit."""
-    _require_positive("cylinder", radius=radius, height=height)
-    middle = sum(c * a for c, a in zip(center, axis, strict=True))
-    back = (-axis[0], -axis[1], -axis[2])
-    bounds = (
-        Quadric(center, axis, radius * radius, 0.0, 0.0),
-        Plane(axis, height / 2.0 + middle),
-        Plane(back, height / 2.0 - middle),
-    )
-    return Cell(bounds, center, math.hypot(radius, height / 2.0))
-
-
-def cone(tip: Vec, axis: Vec, radius: float, height: float) -> Cell:
-    """Cone that opens from `tip` along the unit vector `axis` to a base of `radius`."""
-    _require_positive("cone", radius=radius, height=height)
-    slope = radius / height
-    base = sum(t * a for t, a in zip(tip, axis, strict=True)) + height
-    bounds = (Quadric(tip, axis, 0.0, 0.0, slope * slope), Plane(axis, base))
-    center = tuple(t + height / 2.0 * a for t, a in zip(tip, axis, strict=True))
-    return Cell(bounds, (center[0], center[1], center[2]), math.hypot(radius, height / 2.0))
-
-
-def lens(
-    front: Vec,
-    axis: Vec,
-    radii: tuple[float, float],
-    thickness: float,
-    aperture: float,
-    conics: tuple[float, float] = (0.0, 0.0),
-) -> Cell:
-    """Lens with its front vertex at `front`, its optical axis along the unit vector `axis`.
-
-    `radii` of curvature are positive where the centre lies in the direction of `axis`, infinite
-    for a plane: a biconvex lens has (+, -). A lens that is hollow on a side is no convex solid
-    and is refused. `aperture` is the radius of the cylinder that is its edge; `conics` are the
-    conic constants: 0 a sphere, -1 a paraboloid, below -1 a hyperboloid.
-    """
-    _require_positive("lens", thickness=thickness, aperture=aperture)
-    if not (radii[0] > 0.0 and (radii[1] < 0.0 or radii[1] == INF)):
-        raise SceneError(f"a lens must be convex or plane on both sides, not {radii}")
-    back = tuple(f + thickness * a for f, a in zip(front, axis, strict=True))
-    reverse = (-axis[0], -axis[1], -axis[2])
-    sides = (front, axis, radii[0], conics[0]), (back, reverse, -radii[1], conics[1])
-    bounds: list[Plane | Quadric] = [Quadric(front, axis, aperture * aperture, 0.0, 0.0)]
-    for vertex, inwards, radius, conic in sides:
-        v = (vertex[0], vertex[1], vertex[2])
-        if abs(radius) == INF:
-            outwards = (-inwards[0], -inwards[1], -inwards[2])
-            bounds.append(Plane(outwards, sum(o * p for o, p in zip(outwards, v, strict=True))))
-        else:
-            bounds.append(Quadric(v, inwards, 0.0, 2.0 * radius, -(1.0 + conic)))
-    center = tuple((f + b) / 2.0 for f, b in zip(front, back, strict=True))
-    ball = math.hypot(aperture, thickness / 2.0)
-    return Cell(tuple(bounds), (center[0], center[1], center[2]), ball)
+        require_positive(self, radius=self.radius)
 
 
 # --- rows of numbers ------------------------------------------------------------------------------
@@ -267,29 +198,103 @@ def quadric_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[
 
 
 @inlined
-def cell_stretch(
-    o: Vec, d: Vec, rows: Rows, first: int, count: int, on_face: int
-) -> tuple[float, int, float, int]:
-    """(enter, face entered, leave, face left).
+def bound_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[float, float]:
+    if rows[row, 0] != PLANE:
+        return quadric_stretch(o, d, rows, row, on_it)
+    if on_it:
+        return 0.0, INF  # entered through it; a plane is not crossed twice
+    return plane_stretch(o, d, vec_at(rows, row, 1), rows[row, 4])
 
-    With `on_face` >= 0 the ray starts on that face and points inwards: enter is 0.
+
+@inlined
+def cell_stretch(
+    o: Vec, d: Vec, rows: Rows, first: int, count: int, left: int
+) -> tuple[float, int, float, int]:
+    """(enter, row entered through, leave, row left through) of what is inside `count` bounds.
+
+    If the ray starts on the bound in row `left` and points inwards, enter is 0.
     """
-    enter, enter_face, leave, leave_face = -INF, -1, INF, -1
-    for face in range(count):
-        row = first + face
-        if rows[row, 0] == PLANE:
-            if face == on_face:
-                continue  # entered through it; a plane is not crossed twice
-            t0, t1 = plane_stretch(o, d, vec_at(rows, row, 1), rows[row, 4])
-        else:
-            t0, t1 = quadric_stretch(o, d, rows, row, face == on_face)
+    enter, row_in, leave, row_out = -INF, -1, INF, -1
+    for row in range(first, first + count):
+        t0, t1 = bound_stretch(o, d, rows, row, row == left)
         if t0 > enter:
-            enter, enter_face = t0, face
+            enter, row_in = t0, row
         if t1 < leave:
-            leave, leave_face = t1, face
-    if on_face >= 0:
-        return 0.0, on_face, max(leave, 0.0), leave_face
-    return enter, enter_face, leave, leave_face
+            leave, row_out = t1, row
+    if left >= 0:
+        return 0.0, left, max(leave, 0.0), row_out
+    return enter, row_in, leave, row_out
+
+
+@called
+def compound_hit(
+    o: Vec, d: Vec, rows: Rows, first: int, count: int, left: int, inward: bool, stretches: Rows
+) -> tuple[float, int, bool]:
+    """(distance, row, entering) where a ray next enters or leaves a compound of `count` bounds.
+
+    The ray has just left the bound in row `left` (-1: has not) and heads into the solid if
+    `inward`. `stretches` is scratch. Infinite distance where the solid is not met again.
+    """
+    for k in range(count):
+        row = first + k
+        if row == left and inward == (rows[row, HOLLOW] != 0.0):
+            stretches[k, 0], stretches[k, 1] = -INF, 0.0  # a convex bound is not met again
+        else:
+            stretches[k, 0], stretches[k, 1] = bound_stretch(o, d, rows, row, row == left)
+    t = 0.0
+    inside = _inside_after(rows, first, stretches, t)
+    if left >= 0 and inward and not inside:  # rounding put the exit behind the ray
+        return 0.0, _left_behind(rows, first, count, stretches), False
+    while True:
+        crossing = INF
+        for k in range(count):
+            for end in range(2):
+                if t < stretches[k, end] < crossing:
+                    crossing = stretches[k, end]
+        if crossing == INF:
+            return INF, -1, False
+        t = crossing
+        if _inside_after(rows, first, stretches, t) != inside:
+            return t, _crossed(rows, first, count, stretches, t, not inside), not inside
+
+
+@inlined
+def _inside_after(rows: Rows, first: int, stretches: Rows, t: float) -> bool:
+    """Whether a ray is inside the compound just beyond `t`.
+
+    Bounds that are crossed at the same `t` are crossed together: no gap opens between two parts
+    that share a face.
+    """
+    k = 0
+    while k >= 0:
+        inside = stretches[k, 0] <= t < stretches[k, 1]
+        k = int(rows[first + k, IF_INSIDE if inside else IF_OUTSIDE])
+    return k == INSIDE
+
+
+@inlined
+def _crossed(rows: Rows, first: int, count: int, stretches: Rows, t: float, entering: bool) -> int:
+    """The row of a bound that is crossed at `t` in the same sense as the solid.
+
+    There is one: the solid is composed of insides and outsides of bounds by "and" and "or" alone,
+    so it cannot become true before one of them does.
+    """
+    for k in range(count):
+        hollow = rows[first + k, HOLLOW] != 0.0
+        if stretches[k, 0 if entering != hollow else 1] == t:
+            return first + k
+    return first
+
+
+@inlined
+def _left_behind(rows: Rows, first: int, count: int, stretches: Rows) -> int:
+    """The row of the bound through which a ray has left the solid just before its start."""
+    best, row = -INF, first
+    for k in range(count):
+        t = stretches[k, 0 if rows[first + k, HOLLOW] != 0.0 else 1]
+        if best < t <= 0.0:
+            best, row = t, first + k
+    return row
 
 
 @inlined

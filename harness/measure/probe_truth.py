@@ -172,8 +172,8 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
     level = paths.weight[:, None] * landings[0].transmission
     grazing = np.zeros(len(rays.origins), bool)
     none = np.zeros(len(grazing))
-    # Rates of change by cause, for the point, the direction and the level. Shifts across the ray and
-    # tilts are components, so they add up as lengths; roundings of several indices, in full.
+    # Rates of change by cause, for point, direction and level. Shifts across the ray and tilts are
+    # components, so they add up as lengths; roundings of several indices, in full.
     rates = {cause: [none.copy() for _ in range(3)] for cause in ("origin", "direction", "index")}
     trials = [(cause, exact, moved, step) for cause, moved, step in _shifted(rays, STEP * extent)]
     trials += [("index", ClosedForm(denser), rays, step) for denser, step in _denser(scene)]

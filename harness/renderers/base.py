@@ -32,6 +32,9 @@ class Capability(enum.StrEnum):
     SPHERE = "sphere"  # analytic, not tessellated
     CONVEX = "convex"
     CYLINDER = "cylinder"
+    CONE = "cone"
+    LENS = "lens"  # with spherical or plane faces
+    CONIC = "conic"  # lenses of other conics, too
     MESH = "mesh"
     SMOOTH_MESH = "smooth-mesh"
     THIN_SLAB = "thin-slab"  # the lecture's thin face; others are given a real slab

@@ -226,7 +226,7 @@ def choose() -> Choice:
     try:
         importlib.metadata.version("mitsuba")
     except importlib.metadata.PackageNotFoundError:
-        raise RendererMissing(f"Mitsuba is not installed: {INSTALL}") from None
+        raise RendererMissing(f"Mitsuba is not installed: {INSTALL}", remedy=INSTALL) from None
     failures = []
     for library in _existing(libraries()):
         found = probe(FAST, library)
@@ -236,8 +236,9 @@ def choose() -> Choice:
     found = probe(SLOW)
     if not found.usable:
         remedy = missing_library(found.detail)
-        mend = f": {remedy}" if remedy else ""
-        raise RendererMissing(f"Mitsuba does not work ({found.detail}){mend}", log=found.detail)
+        message = f"Mitsuba does not work ({found.detail})"
+        message += f": {remedy}" if remedy else ""
+        raise RendererMissing(message, log=found.detail, remedy=remedy)
     why = "; ".join(failures) or f"no libLLVM of version {OLDEST_LLVM} or later was found"
     return Choice(SLOW, None, f"renders with {SLOW}, which is slow: {why}", llvm_remedy())
 

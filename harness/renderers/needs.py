@@ -13,6 +13,8 @@ _SHAPES = {
     resolved.Sphere: Capability.SPHERE,
     resolved.Convex: Capability.CONVEX,
     resolved.Cylinder: Capability.CYLINDER,
+    resolved.Cone: Capability.CONE,
+    resolved.Lens: Capability.LENS,
     resolved.Mesh: Capability.MESH,
 }
 _MATERIALS = {
@@ -74,6 +76,8 @@ def _all_reasons(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
 def _of_shape(shape: resolved.SurfaceShape, place: str) -> Iterator[tuple[Capability, str]]:
     if capability := _SHAPES.get(type(shape)):
         yield capability, f"{place} is a {shape.type}"
+    if isinstance(shape, resolved.Lens) and any(shape.conics):
+        yield Capability.CONIC, f"{place} has faces that are no spheres"
     if isinstance(shape, resolved.Mesh) and shape.normals is not None:
         yield Capability.SMOOTH_MESH, f"{place} is shaded smoothly"
 

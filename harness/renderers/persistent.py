@@ -168,8 +168,9 @@ class WorkerRenderer:
             scene = proof_scene(probe.capabilities)
             prove(probe.render(scene, RenderSettings(samples=16)))
         except RendererError as error:
-            detail = " ".join([str(error), *error.log.splitlines()[-1:]])
-            remedy = found.remedy or self._remedy
+            said = [line for line in error.log.splitlines()[-1:] if line not in str(error)]
+            detail = " ".join([str(error), *said])
+            remedy = error.remedy or found.remedy or self._remedy
             return Health(self.name, False, version, found.path, detail, remedy, found.facts)
         except Exception as error:
             detail = f"{type(error).__name__}: {error}"
@@ -221,9 +222,9 @@ class WorkerRenderer:
         except RendererError as error:
             if child is not None:
                 child.close()
-            if isinstance(error, RendererMissing) and self._remedy:
+            if isinstance(error, RendererMissing) and self._remedy and not error.remedy:
                 message = f"{error}; install it with: {self._remedy}"
-                raise RendererMissing(message, log=error.log) from error
+                raise RendererMissing(message, log=error.log, remedy=self._remedy) from error
             raise
         self._hello, self._child = greeting, child
         return child

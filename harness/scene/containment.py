@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.scene import resolved
+from harness.scene.regions import depth, ends, profile, region
 from harness.scene.tessellation import distance, winding
 
 Points = NDArray[np.float64]  # (n, 3)
@@ -44,6 +45,8 @@ def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.fl
             along = local @ axis
             across = np.linalg.norm(local - along[:, None] * axis, axis=1)
             return np.asarray(np.maximum(across - shape.radius, np.abs(along) - shape.height / 2))
+        case resolved.Cone() | resolved.Lens():
+            return depth(region(shape), points)
         case resolved.Mesh():
             vertices, triangles = np.array(shape.vertices), np.array(shape.triangles)
             inside = winding(points, vertices, triangles) > 0.5
@@ -67,8 +70,24 @@ def bounds(shape: resolved.SurfaceShape) -> tuple[Points, Points]:
         case resolved.Cylinder():
             reach = shape.radius * _across(shape.frame)
             reach = reach + shape.height / 2 * np.abs(np.array(shape.frame.z))
+        case resolved.Cone():
+            return _around_rings(
+                shape.frame, [(0.0, shape.radius), (shape.height, shape.top_radius)]
+            )
+        case resolved.Lens():
+            return _around_rings(shape.frame, [(z, shape.aperture) for z in ends(shape)])
     origin = np.array(shape.frame.origin)
     return origin - reach, origin + reach
+
+
+def _around_rings(
+    frame: resolved.Frame, rings: Sequence[tuple[float, float]]
+) -> tuple[Points, Points]:
+    """The bounds of circles around the frame's z axis, each at a height with a radius."""
+    axis, across, origin = np.array(frame.z), _across(frame), np.array(frame.origin)
+    low = np.min([origin + height * axis - radius * across for height, radius in rings], axis=0)
+    high = np.max([origin + height * axis + radius * across for height, radius in rings], axis=0)
+    return low, high
 
 
 def _across(frame: resolved.Frame) -> Points:
@@ -174,7 +193,15 @@ def _samples(shape: resolved.SolidShape, towards: Points) -> Points:
         case resolved.Convex():
             return _polyhedron_samples(shape)
         case resolved.Cylinder():
-            return _cylinder_samples(shape)
+            half = shape.height / 2
+            levels = [(z, shape.radius) for z in np.linspace(-half, half, 9)]
+            return _ring_samples(shape.frame, [*levels, (-half, 0.0), (half, 0.0)])
+        case resolved.Cone():
+            narrower, share = shape.top_radius - shape.radius, np.linspace(0, 1, 9)
+            levels = [(shape.height * s, shape.radius + narrower * s) for s in share]
+            return _ring_samples(shape.frame, [*levels, (0.0, 0.0), (shape.height, 0.0)])
+        case resolved.Lens():
+            return _ring_samples(shape.frame, _lens_rings(shape))
         case resolved.Mesh():
             vertices = np.array(shape.vertices)
             middles = vertices[np.array(shape.triangles)].mean(axis=1)
@@ -203,12 +230,20 @@ def _polyhedron_samples(shape: resolved.Convex) -> Points:
     return np.concatenate([vertices, *edges, *middles])
 
 
-def _cylinder_samples(shape: resolved.Cylinder) -> Points:
+def _ring_samples(frame: resolved.Frame, rings: Sequence[tuple[float, float]]) -> Points:
+    """Points on circles around the frame's z axis, each at a height with a radius."""
     turn = np.linspace(0, 2 * np.pi, 32, endpoint=False)
-    across = np.outer(np.cos(turn), shape.frame.x) + np.outer(np.sin(turn), shape.frame.y)
-    axis = np.array(shape.frame.z) * shape.height / 2
-    rings = [shape.radius * across + level * axis for level in np.linspace(-1, 1, 9)]
-    return np.asarray(np.concatenate([*rings, [axis, -axis]]) + shape.frame.origin)
+    across = np.outer(np.cos(turn), frame.x) + np.outer(np.sin(turn), frame.y)
+    axis = np.array(frame.z)
+    circles = [radius * across + height * axis for height, radius in rings]
+    return np.asarray(np.concatenate(circles) + frame.origin)
+
+
+def _lens_rings(shape: resolved.Lens) -> list[tuple[float, float]]:
+    heights = shape.aperture * np.sqrt(np.linspace(0, 1, 9))
+    faces = [(profile(shape, k, r), r) for k in range(2) for r in heights.tolist()]
+    front, back = (profile(shape, k, shape.aperture) for k in range(2))
+    return [*faces, *((z, shape.aperture) for z in np.linspace(front, back, 5))]
 
 
 # --- crossings of surfaces ------------------------------------------------------------------------

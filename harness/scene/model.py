@@ -9,155 +9,37 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-FARTHEST = 1e12  # of all numbers, so that no product of a few of them overflows
-
-Finite = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, le=FARTHEST, allow_inf_nan=False)]
-Unit = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-Vec3 = tuple[Finite, Finite, Finite]
-NonNegative = Annotated[float, Field(ge=0, le=FARTHEST, allow_inf_nan=False)]
-Rgb = tuple[NonNegative, NonNegative, NonNegative]
-Reflectance = tuple[Unit, Unit, Unit]
-Name = Annotated[
-    str,
-    Field(
-        max_length=64,
-        pattern=r"^[A-Za-z][A-Za-z0-9_-]*$",
-        description="a name: a letter, then letters, digits, _ and -",
-    ),
-]
-
-
-class Strict(BaseModel):
-    # strict: "1.5" and true are no numbers.
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-# --- shapes -------------------------------------------------------------------------------------
-# Every shape takes `rotate`, applied about its centre: axis and angle in degrees, first to last.
-
-
-class Rotation(Strict):
-    axis: Vec3
-    angle: Finite
-
-
-class Placed(Strict):
-    rotate: tuple[Rotation, ...] = ()
-
-
-class Sphere(Placed):
-    type: Literal["sphere"]
-    center: Vec3 = (0, 0, 0)
-    radius: Positive
-
-
-class Box(Placed):
-    type: Literal["box"]
-    center: Vec3 = (0, 0, 0)
-    size: tuple[Positive, Positive, Positive]
-
-
-class Slab(Placed):
-    """A wide box whose front face has the outward normal `normal` and the centre `center`."""
-
-    type: Literal["slab"]
-    center: Vec3 = (0, 0, 0)
-    normal: Vec3 = (0, 0, 1)
-    thickness: Positive
-    size: tuple[Positive, Positive] = (100, 100)
-
-
-class Prism(Placed):
-    """Isosceles prism: apex edge along y through `apex`, opening towards -x.
-
-    Its two refracting faces of length `side` meet at the apex with `apex_angle`, symmetric about
-    the x axis: the entry face has its outward normal in the quadrant (+x, +z), the exit face in
-    (+x, -z), each at apex_angle/2 from ±z. `length` is measured along y, centred on the apex.
-    """
-
-    type: Literal["prism"]
-    apex: Vec3 = (0, 0, 0)
-    apex_angle: Annotated[float, Field(gt=0, lt=180)]
-    side: Positive
-    length: Positive
-
-
-class Cylinder(Placed):
-    """Capped; `center` is its middle, `axis` its direction."""
-
-    type: Literal["cylinder"]
-    center: Vec3 = (0, 0, 0)
-    axis: Vec3 = (0, 1, 0)
-    radius: Positive
-    height: Positive
-
-
-class Icosphere(Placed):
-    """A sphere as a triangle mesh: `subdivisions` of an icosahedron, all vertices on the sphere."""
-
-    type: Literal["icosphere"]
-    center: Vec3 = (0, 0, 0)
-    radius: Positive
-    subdivisions: Annotated[int, Field(ge=0, le=8)]
-    smooth: bool = False
-
-
-class MeshFile(Placed):
-    """A closed mesh from a PLY, OBJ or STL file beside the scene file."""
-
-    type: Literal["mesh"]
-    file: str
-    scale: Positive = 1.0
-    translate: Vec3 = (0, 0, 0)
-    smooth: bool = False
-
-
-class MeshData(Placed):
-    """A closed mesh written out: counter-clockwise from outside."""
-
-    type: Literal["triangles"]
-    vertices: Annotated[tuple[Vec3, ...], Field(min_length=4)]
-    triangles: Annotated[tuple[tuple[int, int, int], ...], Field(min_length=4)]
-    smooth: bool = False
-
-
-class AsMesh(Strict):
-    """Another shape, tessellated along its flat faces: the same solid as polygons."""
-
-    type: Literal["polygons"]
-    of: Annotated[Box | Slab | Prism, Field(discriminator="type")]
-
-
-class Rectangle(Placed):
-    """Open face; `normal` points to its front, `up` gives the direction of its v coordinate."""
-
-    type: Literal["rectangle"]
-    center: Vec3 = (0, 0, 0)
-    normal: Vec3 = (0, 0, 1)
-    up: Vec3 = (0, 1, 0)
-    size: tuple[Positive, Positive]
-
-
-class Disk(Placed):
-    type: Literal["disk"]
-    center: Vec3 = (0, 0, 0)
-    normal: Vec3 = (0, 0, 1)
-    up: Vec3 = (0, 1, 0)
-    radius: Positive
-
-
-SolidShape = Annotated[
-    Sphere | Box | Slab | Prism | Cylinder | Icosphere | MeshFile | MeshData | AsMesh,
-    Field(discriminator="type"),
-]
-SurfaceShape = Annotated[
-    Rectangle | Disk | Sphere | Box | Cylinder | Icosphere | MeshFile | MeshData,
-    Field(discriminator="type"),
-]
-
+from harness.scene.shape_model import FARTHEST as FARTHEST
+from harness.scene.shape_model import AsMesh as AsMesh
+from harness.scene.shape_model import Box as Box
+from harness.scene.shape_model import Cone as Cone
+from harness.scene.shape_model import Cylinder as Cylinder
+from harness.scene.shape_model import Disk as Disk
+from harness.scene.shape_model import Finite as Finite
+from harness.scene.shape_model import Icosphere as Icosphere
+from harness.scene.shape_model import Lens as Lens
+from harness.scene.shape_model import MeshData as MeshData
+from harness.scene.shape_model import MeshFile as MeshFile
+from harness.scene.shape_model import Name as Name
+from harness.scene.shape_model import NonNegative as NonNegative
+from harness.scene.shape_model import Placed as Placed
+from harness.scene.shape_model import Positive as Positive
+from harness.scene.shape_model import Prism as Prism
+from harness.scene.shape_model import Radius as Radius
+from harness.scene.shape_model import Rectangle as Rectangle
+from harness.scene.shape_model import Reflectance as Reflectance
+from harness.scene.shape_model import Rgb as Rgb
+from harness.scene.shape_model import Rotation as Rotation
+from harness.scene.shape_model import Slab as Slab
+from harness.scene.shape_model import SolidShape as SolidShape
+from harness.scene.shape_model import Sphere as Sphere
+from harness.scene.shape_model import Strict as Strict
+from harness.scene.shape_model import SurfaceShape as SurfaceShape
+from harness.scene.shape_model import Unit as Unit
+from harness.scene.shape_model import Vec3 as Vec3
+from harness.scene.shape_model import Wedge as Wedge
 
 # --- patterns and materials -----------------------------------------------------------------------
 
@@ -316,7 +198,7 @@ class Variant(Placed):
     """
 
     name: Name
-    shapes: dict[Name, SolidShape] = {}
+    shapes: dict[Name, SolidShape] = Field(default_factory=dict)
     scale: Positive = 1.0
 
 
@@ -377,7 +259,7 @@ class Case(Strict):
     film: Film = Film()
     camera: Camera
     background: Rgb = (0, 0, 0)
-    media: dict[Name, Medium] = {}
+    media: dict[Name, Medium] = Field(default_factory=dict)
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()
     lights: tuple[PointLight, ...] = ()

@@ -73,6 +73,37 @@ class Cylinder(Frozen):
     height: float
 
 
+class Cone(Frozen):
+    """Cone from a base of `radius` around frame.origin to `top_radius`, `height` along frame.z.
+
+    0 <= top_radius <= radius; 0 is a pointed cone.
+    """
+
+    type: Literal["cone"] = "cone"
+    frame: Frame
+    radius: float
+    top_radius: float
+    height: float
+
+
+class Lens(Frozen):
+    """Lens with its front vertex at frame.origin, its back vertex `thickness` along frame.z.
+
+    `radii` of curvature are positive where the centre lies towards +z, null for a plane: biconvex
+    is (+, -), biconcave (-, +). `conics` are conic constants: both faces are
+    z = r^2 / (R (1 + sqrt(1 - (1 + k) r^2 / R^2))) from their vertices, for r up to `aperture`, the
+    radius of the cylinder that is the edge. Everything between the faces and within the edge is
+    inside.
+    """
+
+    type: Literal["lens"] = "lens"
+    frame: Frame
+    thickness: float
+    radii: tuple[float | None, float | None]
+    conics: tuple[float, float]
+    aperture: float
+
+
 class Mesh(Frozen):
     """Closed triangle mesh, counter-clockwise from outside.
 
@@ -105,9 +136,10 @@ class Disk(Frozen):
     radius: float
 
 
-SolidShape = Annotated[Sphere | Convex | Cylinder | Mesh, Field(discriminator="type")]
+Analytic = Sphere | Convex | Cylinder | Cone | Lens
+SolidShape = Annotated[Sphere | Convex | Cylinder | Cone | Lens | Mesh, Field(discriminator="type")]
 SurfaceShape = Annotated[
-    Sphere | Convex | Cylinder | Mesh | Rectangle | Disk, Field(discriminator="type")
+    Sphere | Convex | Cylinder | Cone | Lens | Mesh | Rectangle | Disk, Field(discriminator="type")
 ]
 
 

@@ -5,6 +5,7 @@ Every function raises SceneInvalid with key paths relative to the shape.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.scene import model, resolved
+from harness.scene import lenses, model, resolved
 from harness.scene.degrees import cosd, sind
 from harness.scene.findings import Finding, SceneInvalid, quoted
 from harness.scene.resolved import Vec3
@@ -60,12 +61,17 @@ def solid_shape(shape: model.SolidShape, folder: Path) -> resolved.SolidShape:
     match shape:
         case model.Sphere():
             return resolved.Sphere(center=_vec(shape.center), radius=shape.radius)
-        case model.Box() | model.Slab() | model.Prism():
+        case model.Box() | model.Slab() | model.Prism() | model.Wedge():
             return _convex(shape)
         case model.AsMesh():
             return polygons(_convex(shape.of))
         case model.Cylinder():
-            return _cylinder(shape)
+            placed = _along_axis(shape, shape.center)
+            return resolved.Cylinder(frame=placed, radius=shape.radius, height=shape.height)
+        case model.Cone():
+            return lenses.cone(shape, _along_axis(shape, shape.center))
+        case model.Lens():
+            return lenses.lens(shape, _along_axis(shape, shape.vertex))
         case model.Icosphere():
             return _icosphere(shape)
         case model.MeshFile() | model.MeshData():
@@ -115,7 +121,7 @@ def _turned_frame(base: resolved.Frame, turn: Matrix) -> resolved.Frame:
     )
 
 
-def _face_frame(shape: model.Rectangle | model.Disk) -> resolved.Frame:
+def _face_frame(shape: model.Rectangle | model.Disk | model.Wedge) -> resolved.Frame:
     if not any(shape.normal):
         raise _no_direction(("normal",), shape.normal)
     base = frame(_vec(shape.center), _vec(shape.normal), _vec(shape.up))
@@ -131,18 +137,18 @@ def _face_frame(shape: model.Rectangle | model.Disk) -> resolved.Frame:
     return _turned_frame(base, turn_of(shape))
 
 
-def _cylinder(shape: model.Cylinder) -> resolved.Cylinder:
-    base = any_frame(_vec(shape.center), _vec(shape.axis))
+def _along_axis(shape: model.Cylinder | model.Cone | model.Lens, origin: Vec3) -> resolved.Frame:
+    """A frame with z along the shape's axis."""
+    base = any_frame(_vec(origin), _vec(shape.axis))
     if base is None:
         raise _no_direction(("axis",), shape.axis)
-    placed = _turned_frame(base, turn_of(shape))
-    return resolved.Cylinder(frame=placed, radius=shape.radius, height=shape.height)
+    return _turned_frame(base, turn_of(shape))
 
 
 # --- convex solids --------------------------------------------------------------------------------
 
 
-def _convex(shape: model.Box | model.Slab | model.Prism) -> resolved.Convex:
+def _convex(shape: model.Box | model.Slab | model.Prism | model.Wedge) -> resolved.Convex:
     match shape:
         case model.Box():
             placed = resolved.Frame(origin=_vec(shape.center), x=X, y=Y, z=Z)
@@ -155,6 +161,8 @@ def _convex(shape: model.Box | model.Slab | model.Prism) -> resolved.Convex:
             return slab(_turned_frame(base, turn_of(shape)), shape.size, shape.thickness)
         case model.Prism():
             return _prism(shape)
+        case model.Wedge():
+            return _wedge(shape)
 
 
 def slab(front: resolved.Frame, size: tuple[float, float], thickness: float) -> resolved.Convex:
@@ -194,6 +202,29 @@ def _prism(shape: model.Prism) -> resolved.Convex:
         axes[1],
     ]
     return _polyhedron(corners, PRISM_FACES, normals)
+
+
+def _wedge(shape: model.Wedge) -> resolved.Convex:
+    front = _face_frame(shape)
+    sine, cosine = sind(shape.angle), cosd(shape.angle)
+    half_width, half_height = shape.size[0] / 2, shape.size[1] / 2
+    growth = half_height * sine / cosine
+    if shape.thickness <= growth:
+        expected = f"more than {growth:.10g}, so that it does not end before its edge"
+        raise SceneInvalid(
+            Finding(("thickness",), "too thin for its angle", quoted(shape.thickness), expected)
+        )
+    axes = (front.x, front.y, front.z)
+    corners = [
+        combination(front.origin, (x, y, z), axes)
+        for back in (True, False)
+        for y in (-half_height, half_height)
+        for z in (-shape.thickness - math.copysign(growth, y) if back else 0.0,)
+        for x in (-half_width, half_width)
+    ]
+    tilted = combination((0.0, 0.0, 0.0), (-sine, -cosine), (front.y, front.z))
+    sides = [direction for axis in axes[:2] for direction in (_opposite(axis), axis)]
+    return _polyhedron(corners, BOX_FACES, [*sides, tilted, front.z])
 
 
 def _opposite(a: Vec3) -> Vec3:
@@ -287,8 +318,10 @@ def smallest_feature(shape: resolved.SurfaceShape) -> float:
     match shape:
         case resolved.Sphere() | resolved.Disk():
             return shape.radius
-        case resolved.Cylinder():
+        case resolved.Cylinder() | resolved.Cone():
             return min(shape.radius, shape.height)
+        case resolved.Lens():
+            return min(shape.aperture, shape.thickness)
         case resolved.Rectangle():
             return min(shape.size)
         case resolved.Mesh():

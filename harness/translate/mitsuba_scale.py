@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from harness.scene import resolved as rs
+from harness.scene.regions import profile
 
 # 600 of Mitsuba's offsets (1e-4): thinner solids would be shifted or swallowed.
 THINNEST = 1 / 16
@@ -35,8 +36,11 @@ def _thickness(shape: rs.SolidShape) -> float:
     match shape:
         case rs.Sphere():
             return 2 * shape.radius
-        case rs.Cylinder():
+        case rs.Cylinder() | rs.Cone():
             return min(2 * shape.radius, shape.height)
+        case rs.Lens():
+            rims = profile(shape, 1, shape.aperture) - profile(shape, 0, shape.aperture)
+            return min(2 * shape.aperture, max(shape.thickness, rims))
         case rs.Convex():
             planes = np.array(shape.planes)
             depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
@@ -111,6 +115,20 @@ def _scaled_shape(shape: rs.SurfaceShape, factor: float) -> rs.SurfaceShape:
                 "frame": _scaled_frame(shape.frame, factor),
                 "radius": shape.radius * factor,
                 "height": shape.height * factor,
+            }
+        case rs.Cone():
+            update = {
+                "frame": _scaled_frame(shape.frame, factor),
+                "radius": shape.radius * factor,
+                "top_radius": shape.top_radius * factor,
+                "height": shape.height * factor,
+            }
+        case rs.Lens():
+            update = {
+                "frame": _scaled_frame(shape.frame, factor),
+                "thickness": shape.thickness * factor,
+                "radii": tuple(None if r is None else r * factor for r in shape.radii),
+                "aperture": shape.aperture * factor,
             }
         case rs.Rectangle():
             width, height = shape.size

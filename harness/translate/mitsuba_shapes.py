@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 
 Node = dict[str, Any]
@@ -40,6 +41,8 @@ def parts(shape: rs.SolidShape | rs.SurfaceShape) -> Iterator[tuple[str, Node]]:
             yield "", _mesh(shape.vertices, shape.triangles, normals=shape.normals)
         case rs.Cylinder():
             yield from _cylinder(shape)
+        case rs.Cone() | rs.Lens():
+            raise RendererUnsupported(f"Mitsuba has no {shape.type}")
         case rs.Rectangle():
             yield "", {"type": "rectangle", "to_world": _on_frame(shape.frame, *shape.size)}
         case rs.Disk():

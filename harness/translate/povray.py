@@ -35,9 +35,10 @@ import numpy as np
 
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
-from harness.scene.containment import signed_distance
+from harness.scene.containment import bounds, signed_distance
 from harness.translate.mitsuba_scale import scaled
 from harness.translate.povray_fit import SHADOW_FLOOR, exposure, length_scale
+from harness.translate.povray_shapes import number, rgb, shape_text, vector
 
 MAX_TRACE_LEVEL = 256
 # Without a floor for weights POV-Ray follows light between parallel faces for ever.
@@ -46,9 +47,6 @@ LEAST_ADC_BAILOUT = 1e-12
 # 1e-6 even at the shadow floor.
 FADE_DISTANCE = 1e-3 * SHADOW_FLOOR
 PAIR_GAP = 2e-3  # scaled units: 20 hit floors, two shadow floors
-# A direction that no edge of a sane mesh is parallel to; points are in a mesh where a ray along
-# it meets an odd number of triangles.
-INSIDE_VECTOR = (0.3713906763541037, 0.5570860145311556, 0.7427813527082074)
 AXIS = {"u": "x", "v": "y"}
 
 
@@ -68,8 +66,8 @@ def translate(scene: rs.ResolvedScene) -> PovScene:
     writer = _Writer(scaled(scene, factor), bright)
     header = (
         "// povray scene.ini\n"
-        f"// lengths are multiplied by {_number(factor)}; "
-        f"radiance is the image divided by {_number(bright)}\n"
+        f"// lengths are multiplied by {number(factor)}; "
+        f"radiance is the image divided by {number(bright)}\n"
     )
     sdl = header + "\n".join(writer.blocks()) + "\n"
     return PovScene(sdl, writer.attachments, bright, factor)
@@ -120,7 +118,7 @@ class _Writer:
             yield _absorption(self.scene.media[0].absorption)
         for light in self.scene.lights:
             yield self._light(light)
-        for solid in sorted(self.scene.solids, key=lambda s: _box_volume(s.shape), reverse=True):
+        for solid in sorted(self.scene.solids, key=_box_volume, reverse=True):
             yield self._solid(solid)
         for surface in self.scene.surfaces:
             yield self._surface(surface)
@@ -132,7 +130,7 @@ class _Writer:
             "global_settings {\n"
             "  assumed_gamma 1.0\n"
             f"  max_trace_level {min(transport.max_depth, MAX_TRACE_LEVEL):d}\n"
-            f"  adc_bailout {_number(max(transport.min_weight, LEAST_ADC_BAILOUT))}\n"
+            f"  adc_bailout {number(max(transport.min_weight, LEAST_ADC_BAILOUT))}\n"
             "}"
         )
 
@@ -140,8 +138,8 @@ class _Writer:
         """Radiance of a diffuse face is pigment * colour * cos * 2 fade^2 / r^2, without 1/pi."""
         factor = self.exposure / (math.pi * 2 * FADE_DISTANCE**2)
         return (
-            f"light_source {{ {_vector(light.position)}, {_rgb(light.intensity, factor)} "
-            f"fade_distance {_number(FADE_DISTANCE)} fade_power 2 media_interaction off }}"
+            f"light_source {{ {vector(light.position)}, {rgb(light.intensity, factor)} "
+            f"fade_distance {number(FADE_DISTANCE)} fade_power 2 media_interaction off }}"
         )
 
     # --- solids ---------------------------------------------------------------------------------
@@ -153,8 +151,8 @@ class _Writer:
         inner, outer = media[solid.medium].absorption, media[solid.exterior].absorption
         more = [i - o for i, o in zip(inner, outer, strict=True)]
         absorption = f" {_absorption(more)}" if any(more) else ""
-        interior = f"interior {{ ior {_number(ior)}{absorption} }}"
-        return _object(solid.shape, self._dielectric(), interior, "hollow", solid=True)
+        interior = f"interior {{ ior {number(ior)}{absorption} }}"
+        return shape_text(solid.shape, self._dielectric(), interior, "hollow", solid=True)
 
     def _dielectric(self) -> str:
         transport = self.scene.transport
@@ -170,10 +168,10 @@ class _Writer:
             case rs.Emissive(pattern=pattern):
                 return self._opaque(shape, self._emissive(pattern, shape))
             case rs.Diffuse():
-                pigment = f"pigment {{ {_rgb(material.reflectance)} }}"
+                pigment = f"pigment {{ {rgb(material.reflectance)} }}"
                 return self._opaque(shape, f"{pigment} finish {{ ambient 0 diffuse 1 }}")
             case rs.Mirror():
-                finish = f"ambient 0 diffuse 0 reflection {{ {_rgb(material.reflectance)} }}"
+                finish = f"ambient 0 diffuse 0 reflection {{ {rgb(material.reflectance)} }}"
                 return self._opaque(shape, f"pigment {{ rgb 0 }} finish {{ {finish} }}")
             case rs.Translucent():
                 return _translucent(shape, material)
@@ -183,10 +181,10 @@ class _Writer:
         """POV-Ray takes a camera inside a shape to be in its medium, unless it is inverted."""
         origin = np.array([self.scene.camera.origin])
         match shape:  # faces and meshes without inside_vector have no inside
-            case rs.Sphere() | rs.Convex() | rs.Cylinder():
+            case rs.Sphere() | rs.Convex() | rs.Cylinder() | rs.Cone() | rs.Lens():
                 if signed_distance(shape, origin)[0] < 0:
-                    return _object(shape, texture, "hollow inverse")
-        return _object(shape, texture, "hollow")
+                    return shape_text(shape, texture, "hollow inverse")
+        return shape_text(shape, texture, "hollow")
 
     # --- patterns -------------------------------------------------------------------------------
 
@@ -206,7 +204,7 @@ class _Writer:
                 pigment = self._position_code(pattern)
             case rs.Picture():
                 pigment, emission = self._picture(pattern), self.exposure
-        finish = f"finish {{ ambient 0 diffuse 0 emission {_number(emission)} }}"
+        finish = f"finish {{ ambient 0 diffuse 0 emission {number(emission)} }}"
         return f"pigment {{ {pigment} }} {finish}"
 
     def _checker(self, pattern: rs.Checker) -> str:
@@ -225,7 +223,7 @@ class _Writer:
         A gradient is the fractional part of the coordinate, in double precision.
         """
         axis, top = AXIS[pattern.axis], 3 * pattern.amplitude * self.exposure
-        red, green, blue = (_rgb(v, top) for v in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+        red, green, blue = (rgb(v, top) for v in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
         return (
             "average pigment_map {\n"
             f"    [1 gradient {axis} color_map {{ [0 rgb 0] [1 {red}] }}]\n"
@@ -244,20 +242,20 @@ class _Writer:
         return f'image_map {{ ppm "{name}" gamma 1.0 }}'
 
     def _radiance(self, radiance: Sequence[float]) -> str:
-        return _rgb(radiance, self.exposure)
+        return rgb(radiance, self.exposure)
 
 
 def _translucent(shape: rs.SurfaceShape, material: rs.Translucent) -> str:
-    r, g, b = (_number(c) for c in material.color)
-    color = f"rgbft <{r}, {g}, {b}, {_number(material.filter)}, {_number(material.transmit)}>"
+    r, g, b = (number(c) for c in material.color)
+    color = f"rgbft <{r}, {g}, {b}, {number(material.filter)}, {number(material.transmit)}>"
     texture = f"pigment {{ {color} }} finish {{ ambient 0 diffuse 1 }}"
     if not isinstance(shape, rs.Rectangle | rs.Disk):
-        return _object(shape, texture, "interior { ior 1 }", "hollow")
+        return shape_text(shape, texture, "interior { ior 1 }", "hollow")
     frame = shape.frame
     behind = tuple(o - PAIR_GAP * z for o, z in zip(frame.origin, frame.z, strict=True))
     back = shape.model_copy(update={"frame": frame.model_copy(update={"origin": behind})})
     clear = "pigment { rgbt 1 } finish { ambient 0 diffuse 0 }"
-    faces = f"{_object(shape, texture)}\n{_object(back, clear)}"
+    faces = f"{shape_text(shape, texture)}\n{shape_text(back, clear)}"
     return f"union {{\n{faces}\n  interior {{ ior 1 }}\n  hollow\n}}"
 
 
@@ -270,101 +268,20 @@ def _camera(scene: rs.ResolvedScene) -> str:
         kind, width = "orthographic", camera.width
     return (
         f"camera {{\n  {kind}\n"
-        f"  location {_vector(camera.origin)}\n"
-        f"  direction {_vector(camera.forward)}\n"
-        f"  right {_vector([width * c for c in camera.right])}\n"
-        f"  up {_vector([width * aspect * c for c in camera.up])}\n"
+        f"  location {vector(camera.origin)}\n"
+        f"  direction {vector(camera.forward)}\n"
+        f"  right {vector([width * c for c in camera.right])}\n"
+        f"  up {vector([width * aspect * c for c in camera.up])}\n"
         "}"
     )
 
 
 def _absorption(absorption: Sequence[float]) -> str:
     """Homogeneous, so one sample of one interval is exact."""
-    return f"media {{ absorption {_rgb(absorption)} method 1 intervals 1 samples 1, 1 }}"
+    return f"media {{ absorption {rgb(absorption)} method 1 intervals 1 samples 1, 1 }}"
 
 
-# --- shapes ---------------------------------------------------------------------------------------
-
-
-def _object(shape: rs.SurfaceShape, *modifiers: str, solid: bool = False) -> str:
-    """The shape with its modifiers; of a rectangle or disk the pattern goes with its matrix."""
-    body = "\n  ".join(modifiers)
-    match shape:
-        case rs.Sphere():
-            head = f"sphere {{ {_vector(shape.center)}, {_number(shape.radius)}"
-        case rs.Cylinder():
-            middle, half = np.array(shape.frame.origin), shape.height / 2 * np.array(shape.frame.z)
-            ends = f"{_vector(middle - half)}, {_vector(middle + half)}"
-            head = f"cylinder {{ {ends}, {_number(shape.radius)}"
-        case rs.Convex():
-            # Planes are double precision; the vertices of a mesh2 would be single.
-            planes = (f"  plane {{ {_vector(p[:3])}, {_number(p[3])} }}" for p in shape.planes)
-            head = "\n".join(("intersection {", *planes))
-        case rs.Mesh():
-            return _mesh(shape, body, solid)
-        case rs.Rectangle():
-            head = "polygon { 5, <0, 0>, <1, 0>, <1, 1>, <0, 1>, <0, 0>"
-            body += f"\n  {_unit_square_to(shape.frame, *shape.size)}"
-        case rs.Disk():
-            head = "disc { <0.5, 0.5, 0>, z, 0.5"
-            body += f"\n  {_unit_square_to(shape.frame, 2 * shape.radius, 2 * shape.radius)}"
-    return f"{head}\n  {body}\n}}"
-
-
-def _unit_square_to(frame: rs.Frame, width: float, height: float) -> str:
-    """The matrix that takes (u, v, 0) to the face; its rows are the images of x, y, z, origin."""
-    x, y, z = width * np.array(frame.x), height * np.array(frame.y), np.array(frame.z)
-    corner = np.array(frame.origin) - (x + y) / 2
-    numbers = ", ".join(_number(c) for c in (*x, *y, *(z * max(width, height)), *corner))
-    return f"matrix <{numbers}>"
-
-
-def _mesh(shape: rs.Mesh, body: str, solid: bool) -> str:
-    """Vertices are single precision, so they are written relative to the middle of the mesh."""
-    vertices = np.array(shape.vertices)
-    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    lists = [_list("vertex_vectors", vertices - middle)]
-    if shape.normals is not None:
-        lists.append(_list("normal_vectors", shape.normals))
-    faces = ", ".join(f"<{a:d}, {b:d}, {c:d}>" for a, b, c in shape.triangles)
-    lists.append(f"  face_indices {{ {len(shape.triangles):d}, {faces} }}")
-    if solid:
-        lists.append(f"  inside_vector {_vector(INSIDE_VECTOR)}")
-    return "\n".join(("mesh2 {", *lists, f"  {body}", f"  translate {_vector(middle)}", "}"))
-
-
-def _list(name: str, vectors: Sequence[Sequence[float]] | np.ndarray) -> str:
-    return f"  {name} {{ {len(vectors):d}, {', '.join(_vector(v) for v in vectors)} }}"
-
-
-def _box_volume(shape: rs.SolidShape) -> float:
+def _box_volume(solid: rs.Solid) -> float:
     """Volume of the box along the axes around a solid, which is smaller for all that is in it."""
-    match shape:
-        case rs.Sphere():
-            size = np.full(3, 2 * shape.radius)
-        case rs.Cylinder():
-            axis = np.array(shape.frame.z)
-            across = np.sqrt(np.maximum(1 - axis**2, 0))
-            size = shape.height * np.abs(axis) + 2 * shape.radius * across
-        case rs.Convex() | rs.Mesh():
-            size = np.ptp(np.array(shape.vertices), axis=0)
-    return float(size.prod())
-
-
-# --- numbers --------------------------------------------------------------------------------------
-
-
-def _number(value: float) -> str:
-    """The one way by which a scene's values become text. Raises ValueError unless finite."""
-    number = float(value)
-    if not math.isfinite(number):
-        raise ValueError(f"not a finite number: {number}")
-    return repr(number)
-
-
-def _vector(values: Sequence[float] | np.ndarray) -> str:
-    return f"<{', '.join(_number(v) for v in values)}>"
-
-
-def _rgb(values: Sequence[float], factor: float = 1.0) -> str:
-    return f"rgb {_vector([factor * v for v in values])}"
+    low, high = bounds(solid.shape)
+    return float((high - low).prod())

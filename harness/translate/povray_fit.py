@@ -14,7 +14,8 @@ import numpy as np
 
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
-from harness.scene.containment import signed_distance
+from harness.scene.containment import bounds, signed_distance
+from harness.scene.regions import profile
 
 # configbackend.h of POV-Ray 3.7: MIN_ISECT_DEPTH, SMALL_TOLERANCE, MAX_DISTANCE.
 HIT_FLOOR = 1e-4
@@ -53,8 +54,11 @@ def thickness(shape: rs.SolidShape) -> float:
     match shape:
         case rs.Sphere():
             return 2 * shape.radius
-        case rs.Cylinder():
+        case rs.Cylinder() | rs.Cone():
             return min(2 * shape.radius, shape.height)
+        case rs.Lens():
+            rims = profile(shape, 1, shape.aperture) - profile(shape, 0, shape.aperture)
+            return min(2 * shape.aperture, max(shape.thickness, rims))
         case rs.Convex():
             planes = np.array(shape.planes)
             depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
@@ -82,6 +86,8 @@ def _extent(shape: rs.SurfaceShape) -> float:
             return float(np.abs(shape.vertices).max())
         case rs.Cylinder():
             return float(np.abs(shape.frame.origin).max()) + shape.radius + shape.height / 2
+        case rs.Cone() | rs.Lens():
+            return float(np.abs(bounds(shape)).max())
         case rs.Rectangle():
             return float(np.abs(shape.frame.origin).max()) + math.hypot(*shape.size) / 2
         case rs.Disk():

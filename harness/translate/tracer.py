@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import math
 
 import numpy as np
 
@@ -11,7 +12,9 @@ import tracer.mesh
 import tracer.patterns
 import tracer.scene
 import tracer.shapes
+import tracer.solids
 from harness.scene import resolved
+from harness.scene.regions import along, opposite
 
 
 def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
@@ -55,16 +58,30 @@ def _camera(
 
 def _solid_shape(
     shape: resolved.SolidShape,
-) -> tracer.shapes.Sphere | tracer.shapes.Cell | tracer.mesh.Mesh:
+) -> tracer.scene.SolidShape:
     match shape:
         case resolved.Sphere():
             return tracer.shapes.Sphere(shape.center, shape.radius)
         case resolved.Convex():
             planes = [tracer.shapes.Plane((x, y, z), d) for x, y, z, d in shape.planes]
-            return tracer.shapes.polyhedron(planes, list(shape.vertices))
+            return tracer.solids.polyhedron(planes, list(shape.vertices))
         case resolved.Cylinder():
             frame = shape.frame
-            return tracer.shapes.cylinder(frame.origin, frame.z, shape.radius, shape.height)
+            return tracer.solids.cylinder(frame.origin, frame.z, shape.radius, shape.height)
+        case resolved.Cone(frame=frame):
+            top = along(frame.origin, shape.height, frame.z)
+            down = opposite(frame.z)
+            return tracer.solids.cone(top, down, shape.radius, shape.height, shape.top_radius)
+        case resolved.Lens(frame=frame):
+            first, second = (math.inf if r is None else r for r in shape.radii)
+            return tracer.solids.lens(
+                frame.origin,
+                frame.z,
+                (first, second),
+                shape.thickness,
+                shape.aperture,
+                shape.conics,
+            )
         case resolved.Mesh():
             normals = None if shape.normals is None else np.array(shape.normals, float)
             return tracer.mesh.Mesh(

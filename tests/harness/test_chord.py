@@ -14,8 +14,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from harness.chord import Body, Chord
+from harness.chord import Body
 from harness.expected import Float
+from harness.intervals import Chord
 from harness.scene.model import Icosphere
 from harness.scene.resolved import Convex, Cylinder, Frame, Mesh, Solid, SolidShape, Sphere
 from harness.scene.shapes import solid_shape
@@ -118,7 +119,7 @@ def test_sphere(
 ) -> None:
     sphere = Sphere(center=center, radius=radius)
     origin, direction = line(o, d)
-    chord = body(sphere).chord(origin[None], direction[None])
+    chord = body(sphere).chords(origin[None], direction[None])[0]
     closest = np.cross(np.array(center) - origin, direction)
     assume(abs(np.linalg.norm(closest) - radius) > 1e-6)  # nor does it graze
     assert (chord.t_in[0] < chord.t_out[0]) == (np.linalg.norm(closest) < radius)
@@ -134,7 +135,7 @@ def test_box(
 ) -> None:
     middle, size = np.array(center), np.array(half)
     origin, direction = line(o, d)
-    chord = body(box(middle, size)).chord(origin[None], direction[None])
+    chord = body(box(middle, size)).chords(origin[None], direction[None])[0]
     assert_chord_of(box_function(middle, size), chord, origin, direction)
 
 
@@ -151,7 +152,7 @@ def test_cylinder(
     origin, direction = line(o, d)
     across = np.linalg.norm(np.cross(direction, cylinder.frame.z))
     assume(across == 0 or across > 1e-3)  # nearly along the axis the side's roots cancel
-    chord = body(cylinder).chord(origin[None], direction[None])
+    chord = body(cylinder).chords(origin[None], direction[None])[0]
     away = np.cross(direction, np.array(cylinder.frame.z))
     if across:
         gap = abs(float((origin - np.array(center)) @ away)) / across
@@ -165,7 +166,7 @@ FLAT = frame_along((0, 0, 1), (0, 0, 0))
 @pytest.mark.parametrize("x", [0.0, 0.3, 0.999, 1.001, 5.0])
 def test_lines_along_the_axis_of_a_cylinder_meet_its_caps(x: float) -> None:
     cylinder = Cylinder(frame=FLAT, radius=1.0, height=3.0)
-    chord = body(cylinder).chord(np.array([[x, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]]))
+    chord = body(cylinder).chords(np.array([[x, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]]))[0]
     if x > 1:
         assert chord.t_in[0] > chord.t_out[0]
         return
@@ -177,7 +178,7 @@ def test_lines_along_the_axis_of_a_cylinder_meet_its_caps(x: float) -> None:
 @pytest.mark.parametrize("height", [-0.5, 0.5, 1.5])
 def test_lines_along_the_faces_of_a_slab_are_inside_or_outside(height: float) -> None:
     slab = box(np.zeros(3), np.array([50.0, 50.0, 1.0]))
-    chord = body(slab).chord(np.array([[0.0, 0.0, height]]), np.array([[1.0, 0.0, 0.0]]))
+    chord = body(slab).chords(np.array([[0.0, 0.0, height]]), np.array([[1.0, 0.0, 0.0]]))[0]
     if abs(height) > 1:
         assert chord.t_in[0] > chord.t_out[0]
     else:
@@ -185,7 +186,7 @@ def test_lines_along_the_faces_of_a_slab_are_inside_or_outside(height: float) ->
 
 
 def test_a_line_that_starts_inside_enters_behind_itself() -> None:
-    chord = body(Sphere(center=(0, 0, 0), radius=2)).chord(
+    (chord,) = body(Sphere(center=(0, 0, 0), radius=2)).chords(
         np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]])
     )
     assert (chord.t_in[0], chord.t_out[0]) == (-1.0, 3.0)
@@ -195,7 +196,7 @@ def test_a_line_that_starts_inside_enters_behind_itself() -> None:
 def test_a_slab_of_any_thinness_has_its_two_faces(thickness: float) -> None:
     """Nothing in the closed form is thresholded."""
     slab = box(np.array([0.0, 0.0, -thickness / 2]), np.array([50.0, 50.0, thickness / 2]))
-    chord = body(slab).chord(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.6, -0.8]]))
+    chord = body(slab).chords(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.6, -0.8]]))[0]
     assert chord.t_in[0] == pytest.approx(1.25, rel=4 * EPS)
     assert chord.t_out[0] - chord.t_in[0] == pytest.approx(thickness / 0.8, abs=4 * EPS * 1.25)
     assert chord.t_in[0] < chord.t_out[0]
@@ -232,7 +233,7 @@ def test_the_chord_of_a_convex_mesh_is_where_the_line_crosses_its_triangles(
     crossed = np.all(volumes > 0, axis=1) | np.all(volumes < 0, axis=1)
     weights = volumes[crossed] / volumes[crossed].sum(axis=1, keepdims=True)
     hits = np.sort(np.einsum("ij,ijk->ik", weights, corners[crossed]) @ direction)
-    chord = BALL_BODY.chord(origin[None], direction[None])
+    chord = BALL_BODY.chords(origin[None], direction[None])[0]
     assert len(hits) in (0, 2)
     if not len(hits):
         assert chord.t_out[0] < chord.t_in[0]
@@ -253,9 +254,9 @@ def test_many_lines_are_the_same_as_one_by_one() -> None:
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     assert 4000 * len(mesh.triangles) > 2_000_000
     solid = body(mesh)
-    whole = solid.chord(o, d)
+    whole = solid.chords(o, d)[0]
     for rows in (slice(0, 10), slice(1990, 2010), slice(3990, 4000)):
-        part = solid.chord(o[rows], d[rows])
+        part = solid.chords(o[rows], d[rows])[0]
         for name in ("t_in", "t_out", "n_in", "n_out"):
             assert (getattr(whole, name)[rows] == getattr(part, name)).all()
 

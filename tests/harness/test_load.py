@@ -141,6 +141,9 @@ def test_case_names_are_fit_for_files() -> None:
 
 # --- what does not --------------------------------------------------------------------------------
 
+SHAPES = (
+    "box, cone, cylinder, icosphere, lens, mesh, polygons, prism, slab, sphere, triangles or wedge"
+)
 EDITS = {
     # name: (old, new, line, key, message, value, expected, suggestion); None matches anything
     "unknown key": (
@@ -169,12 +172,12 @@ EDITS = {
     "missing type": (
         'type = "sphere", ', "",
         18, "solids[0].shape.type", "missing", None,
-        "box, cylinder, icosphere, mesh, polygons, prism, slab, sphere or triangles", None,
+        SHAPES, None,
     ),
     "unknown shape": (
         '"sphere"', '"shpere"',
         18, "solids[0].shape.type", "unknown type", '"shpere"',
-        "box, cylinder, icosphere, mesh, polygons, prism, slab, sphere or triangles", "sphere",
+        SHAPES, "sphere",
     ),
     "unknown material": (
         '"emissive"', '"emisive"',

@@ -230,6 +230,18 @@ def test_engines_that_do_not_start(
     assert health.remedy == "do this"
 
 
+def test_what_mends_it_is_told_once_and_by_who_knows_it(make) -> None:
+    def environment() -> dict[str, str]:
+        raise RendererMissing("no atoms: do that", log="no atoms", remedy="do that")
+
+    renderer = make("Plain", env=environment, remedy="do this")
+    with pytest.raises(RendererMissing) as caught:
+        renderer.version()
+    assert str(caught.value) == "no atoms: do that"
+    health = renderer.health()
+    assert (health.detail, health.remedy) == ("no atoms: do that", "do that")
+
+
 def test_a_program_that_is_not_there(make) -> None:
     with pytest.raises(RendererMissing, match="snellcheck-no-such-program"):
         make(Program(("snellcheck-no-such-program",))).version()

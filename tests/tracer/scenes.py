@@ -12,7 +12,8 @@ from tracer.mesh import Mesh
 from tracer.path import Paths, follow
 from tracer.patterns import Constant
 from tracer.scene import Emissive, Medium, Scene, Solid, Surface
-from tracer.shapes import Cell, Plane, Rectangle, Sphere, polyhedron
+from tracer.shapes import Plane, Rectangle, Sphere
+from tracer.solids import Cell, polyhedron
 from tracer.vector import Vec
 
 Floats = NDArray[np.float64]

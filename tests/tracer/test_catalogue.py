@@ -20,7 +20,8 @@ from tracer.camera import Orthographic
 from tracer.path import HIT, TIR
 from tracer.recursion import render
 from tracer.scene import Medium, Scene, Solid, ThinSlab, Transport
-from tracer.shapes import Cell, Plane, Sphere, cylinder, lens, polyhedron
+from tracer.shapes import Plane, Sphere
+from tracer.solids import Cell, cylinder, lens, polyhedron
 from tracer.spectrum import GLASSES, LINE_C, LINE_D, LINE_F, abbe_number, from_abbe
 from tracer.vector import Vec, dot, normalise, sub
 

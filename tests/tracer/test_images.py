@@ -26,7 +26,8 @@ from tracer.scene import (
     Translucent,
     Transport,
 )
-from tracer.shapes import Rectangle, Sphere, cylinder
+from tracer.shapes import Rectangle, Sphere
+from tracer.solids import cylinder
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)

@@ -19,7 +19,8 @@ from tests.tracer.scenes import Floats, angles, down, glass, one, slab, wall
 from tracer import optics
 from tracer.path import follow
 from tracer.scene import Medium, Scene, Solid
-from tracer.shapes import Sphere, lens
+from tracer.shapes import Sphere
+from tracer.solids import lens
 
 EPS = float(np.finfo(float).eps)
 ANGLES = [0.0, 20.0, 45.0, 60.0, 80.0]

@@ -14,7 +14,8 @@ from tracer import optics
 from tracer.path import HIT, MISS, TIR, follow
 from tracer.recursion import render
 from tracer.scene import Medium, Scene, Solid, Surface, ThinSlab, Transport
-from tracer.shapes import Cell, Plane, Quadric, Rectangle, Sphere, cone, cylinder, lens
+from tracer.shapes import Plane, Quadric, Rectangle, Sphere
+from tracer.solids import Cell, cone, cylinder, lens
 from tracer.vector import Vec, dot, normalise
 
 EPS = float(np.finfo(float).eps)

@@ -1,0 +1,126 @@
+"""Which cause explains a case best, and whether it explains it at all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.diagnosis.evidence import Evidence
+from harness.diagnosis.fit import Fit, fit, truth_fit
+from harness.diagnosis.hypothesis import Fitted, Hypothesis
+from harness.diagnosis.library import LIBRARY
+from harness.record import Cause, CauseFit, Diagnosis
+
+# A cause fits where it leaves no more than twice the tolerance, or 3% of the deviation.
+WITHIN = 2.0
+LEFT = 0.03
+# What being further down in the library costs: no more than enough to decide between equals.
+ORDER = 0.01
+# Two causes explain a case equally well where their costs differ by less.
+SAME = 2.0
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """A hypothesis with its cost, complexity included."""
+
+    fit: Fit
+    cost: float
+
+
+def complexity(hypothesis: Hypothesis, rays: int) -> float:
+    """Half of k log n, as in Schwarz's criterion (1978), and the order of the library."""
+    return hypothesis.size / 2 * float(np.log(max(rays, 2))) + ORDER * LIBRARY.index(hypothesis)
+
+
+def rank(evidence: Sequence[Evidence]) -> list[Ranked]:
+    """All hypotheses that say something about the evidence, the best first."""
+    ranked = []
+    for hypothesis in LIBRARY:
+        found = fit(hypothesis, evidence)
+        if found is not None:
+            cost = found.score + complexity(hypothesis, sum(found.rays))
+            cost += min(hypothesis.prior(piece.setting) for piece in evidence)
+            ranked.append(Ranked(found, cost))
+    return sorted(ranked, key=lambda r: r.cost)
+
+
+def diagnose(renderer: str, evidence: Sequence[Evidence]) -> Diagnosis | None:
+    """The diagnosis of one case; None where the evidence shows no deviation."""
+    truth = truth_fit(evidence)
+    if not evidence or max(truth.squares) <= 1:
+        return None
+    ranked = rank(evidence)
+    deviation = float(np.sqrt(np.average(truth.squares, weights=truth.rays)))
+    iors = indices(evidence)
+    best, second = ranked[0], next(r for r in ranked if not akin(r, ranked[0]))
+    nearest, next_best = (cause_of(r.fit, deviation, iors) for r in (best, second))
+    if truth.score - best.cost > SAME and fits(best.fit.squares, truth.squares):
+        sentence, cause, runner_up = f"{renderer} {nearest.sentence}", nearest, next_best
+        if second.cost - best.cost < SAME and fits(second.fit.squares, truth.squares):
+            sentence += f"; or it {next_best.sentence}, which explains this case equally well"
+    else:
+        sentence, cause, runner_up = no_cause(renderer, nearest), None, nearest
+    return Diagnosis(
+        renderer=renderer, sentence=sentence, cause=cause, runner_up=runner_up,
+        deviation=deviation, rays=sum(truth.rays), iors=list(iors),
+        fits=[
+            CauseFit(id="", values=[], score=truth.score, information=0.0, fits=False),
+            *(
+                CauseFit(
+                    id=r.fit.hypothesis.id, values=list(r.fit.values), score=r.fit.score,
+                    information=r.fit.information, fits=fits(r.fit.squares, truth.squares),
+                )
+                for r in ranked
+            ),
+        ],
+    )  # fmt: skip
+
+
+def akin(a: Ranked, b: Ranked) -> bool:
+    """Whether two hypotheses say the same of a single case."""
+    mine, other = a.fit.hypothesis, b.fit.hypothesis
+    return mine is other or (mine.kin != "" and mine.kin == other.kin)
+
+
+def no_cause(renderer: str, nearest: Cause) -> str:
+    """The sentence of a diagnosis that found nothing."""
+    return (
+        f"none of the known causes fits what {renderer} does; the nearest is that it "
+        f"{nearest.sentence}, which leaves {nearest.residual:.3g} tolerances"
+    )
+
+
+def fits(squares: Sequence[float], truth: Sequence[float]) -> bool:
+    """Whether mean squares of misfits are within tolerance, or little of what truth leaves."""
+    pairs = zip(squares, truth, strict=True)
+    return all(q <= WITHIN**2 or q <= LEFT**2 * t for q, t in pairs)
+
+
+def cause_of(found: Fit, deviation: float, iors: tuple[float, ...]) -> Cause:
+    """The fit for the record."""
+    hypothesis = found.hypothesis
+    fitted = Fitted(found.values, found.errors, iors)
+    has_value = bool(hypothesis.size)
+    return Cause(
+        id=hypothesis.id, sentence=hypothesis.says(fitted), parameter=hypothesis.parameter,
+        value=found.values[0] if has_value else None,
+        uncertainty=found.errors[0] if has_value and hypothesis.continuous else None,
+        unit=hypothesis.unit, residual=found.residual,
+        explains=max(0.0, 1 - found.residual / deviation) if deviation > 0 else 0.0,
+    )  # fmt: skip
+
+
+def indices(evidence: Sequence[Evidence]) -> tuple[float, ...]:
+    """The indices that fill the solids of all scenes."""
+    return tuple(
+        sorted(
+            {
+                piece.setting.scene.media[solid.medium].ior
+                for piece in evidence
+                for solid in piece.setting.scene.solids
+            }
+        )
+    )

@@ -1,0 +1,87 @@
+"""A world: the scene as a renderer has it, its rays, its laws, and what it makes of the result.
+
+The right world is a setting without changes. A hypothesis is a function that changes one thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting
+from harness.expected import Float
+from harness.law import PHYSICS, Law
+from harness.renderers.base import Rays, Status
+from harness.scene.resolved import ResolvedScene
+from harness.truth import ClosedForm, TruePaths
+
+
+@dataclass(frozen=True)
+class World:
+    """`finish` changes the rays that leave the glass, `shown` the light that they bring.
+
+    `n2` is the power of (ior at the camera / ior at the light) that scales radiance.
+    """
+
+    setting: Setting
+    scene: ResolvedScene
+    rays: Rays
+    law: Law = PHYSICS
+    finish: Callable[[Rays, TruePaths], TruePaths] = lambda _, paths: paths
+    shown: Callable[[Float], Float] = lambda level: level
+    n2: float = 0.0
+
+    @classmethod
+    def right(cls, setting: Setting) -> World:
+        """The world as physics and the renderer's own claims have it."""
+        return cls(setting, setting.scene, setting.rays, n2=2.0 if setting.n2 else 0.0)
+
+    def with_law(self, **rules: object) -> World:
+        """The world with some of its laws exchanged."""
+        return replace(self, law=replace(self.law, **rules))  # type: ignore[arg-type]
+
+
+def misfit(world: World, evidence: Evidence) -> Float:
+    """What the world predicts minus what was measured, in tolerances, for each ray (m, figures).
+
+    A ray that lands where it should be dark, or the other way round, is as wrong as one that lands
+    a tenth of the plane aside.
+    """
+    form = ClosedForm(world.scene, world.law)
+    with np.errstate(all="ignore"):
+        paths = world.finish(world.rays, form.follow(world.rays, evidence.setting.path))
+        if isinstance(evidence, Levels):
+            return _of_levels(world, form, paths, evidence)
+        return _of_landings(form, paths, evidence)
+
+
+def _of_levels(world: World, form: ClosedForm, paths: TruePaths, evidence: Levels) -> Float:
+    landing = form.land(paths, evidence.setting.planes[0])
+    ior = np.array([medium.ior for medium in world.scene.media])
+    scale = (ior[world.scene.camera.medium] / ior[paths.medium]) ** world.n2
+    level = (paths.weight * scale)[:, None] * landing.transmission
+    level = world.shown(np.where((landing.status == Status.HIT)[:, None], level, 0.0))
+    gap = (level - evidence.level) / evidence.tolerance
+    # Where the image holds no number, a prediction is right that has none either.
+    nowhere = ~np.isfinite(evidence.level)
+    same = np.isnan(level) == nowhere
+    wrong = 0.1 / evidence.tolerance
+    return np.where(nowhere | np.isnan(level), np.where(same, 0.0, wrong), gap)
+
+
+def _of_landings(form: ClosedForm, paths: TruePaths, evidence: Landings) -> Float:
+    planes = evidence.setting.planes
+    on = [form.land(paths, plane) for plane in planes]
+    lands = np.all([landing.status == Status.HIT for landing in on], axis=0)
+    both = lands & evidence.seen
+    gap = (on[0].point - evidence.point) / evidence.point_tolerance[:, None]
+    figures = [gap]
+    if evidence.direction is not None:
+        turn = paths.direction - evidence.direction
+        figures.append(turn / evidence.direction_tolerance[:, None])
+    aside = 0.1 * max(planes[0].size) / evidence.point_tolerance
+    other = np.where(lands == evidence.seen, 0.0, aside)
+    found = np.concatenate(figures, axis=1)
+    return np.where(both[:, None], np.nan_to_num(found), other[:, None])

@@ -1,0 +1,152 @@
+"""Has renderers diagnosed: in one case from what its probes tell, in a run from all its cases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from harness import plan
+from harness.camera import primary_rays
+from harness.diagnosis.choose import diagnose
+from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
+from harness.diagnosis.whole_run import Witness, diagnose_run
+from harness.measure.comparison import Unmeasurable
+from harness.measure.observables import Observable
+from harness.measure.probe_truth import ProbeTruth
+from harness.measure.rays import RayMeasurement
+from harness.plan import PreparedCase
+from harness.record import Check, Diagnosis, SummaryCase, Verdict
+from harness.renderers.base import Capability, Rays, Status
+from harness.results import Contender, NotAvailable, Results
+from harness.scene import model
+from harness.scene.resolve import expand_thin_slabs
+from harness.scene.resolved import ThinSlab
+from harness.truth import ClosedForm
+
+OFF = (Verdict.FAIL, Verdict.KNOWN, Verdict.ERROR)
+
+
+class Explainer:
+    """Diagnoses the renderers of one case. `truth_of` and `measured` are the judge's own."""
+
+    def __init__(
+        self,
+        case: PreparedCase,
+        results: Results,
+        truth_of: Callable[[model.Probe], ProbeTruth],
+        measured: Callable[[Contender, model.Probe], RayMeasurement],
+    ) -> None:
+        self._case, self._results = case, results
+        self._truth_of, self._measured = truth_of, measured
+
+    def explain(self, contender: Contender, checks: list[Check]) -> Diagnosis | None:
+        """Why `contender` is off in this case; None where it is not, or where nothing tells."""
+        mine = [c for c in checks if c.renderer == contender.name and c.against == "truth"]
+        if contender.absent is not None or not any(c.status in OFF for c in mine):
+            return None
+        evidence = list(self._evidence(contender))
+        return diagnose(contender.name, evidence) if evidence else None
+
+    def _evidence(self, contender: Contender) -> Iterator[Evidence]:
+        for probe in self._case.loaded.model.probes:
+            try:
+                piece = self._piece(contender, probe)
+            except (NotAvailable, Unmeasurable, ValueError):
+                continue  # the checks say so
+            if piece is not None:
+                yield piece
+
+    def _piece(self, contender: Contender, probe: model.Probe) -> Evidence | None:
+        if probe.measure == "all-light":
+            return None  # many paths at once fit no single cause
+        truth, preflight = self._truth_of(probe), contender.ready()
+        precision = contender.precision(self._case.scene)
+        thin = Capability.THIN_SLAB in contender.capabilities and any(
+            isinstance(s.material, ThinSlab) for s in self._case.scene.surfaces
+        )
+        if probe.measure == "light":
+            pixels = self._results.picture(contender, plan.light_role(probe))
+            n2 = Capability.RADIANCE_N2 in contender.capabilities
+            return levels(truth, pixels, precision, preflight.quantum, preflight.samples, n2, thin)
+        return landings(truth, self._measured(contender, probe), precision, thin)
+
+
+# --- a run ----------------------------------------------------------------------------------------
+
+# Of the cases in which a renderer is right, as many are asked what they say against a cause.
+MOST_WITNESSES = 24
+WITNESS_RAYS = 48
+# A renderer that passed deviates by less than its tolerances: as a rule, by less than these.
+BOUNDARIES = {
+    Observable.TIR, Observable.CRITICAL_ANGLE, Observable.FIRST_TRANSMITTING_ANGLE
+}  # fmt: skip
+POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
+
+
+def explain_run(
+    cases: Sequence[PreparedCase], judged: Sequence[SummaryCase], renderers: Sequence[str]
+) -> list[Diagnosis]:
+    """Why each renderer is off in this run; nothing of those that are not."""
+    found: list[Diagnosis] = []
+    for renderer in renderers:
+        by_case = {c.id: d for c in judged for d in c.diagnoses if d.renderer == renderer}
+        if by_case:
+            witnesses = list(_witnesses(cases, judged, renderer))
+            found += diagnose_run(renderer, by_case, witnesses)
+    return found
+
+
+def _witnesses(
+    cases: Sequence[PreparedCase], judged: Sequence[SummaryCase], renderer: str
+) -> Iterator[Witness]:
+    """Cases in which the renderer passed all checks against the truth, one for each scene file."""
+    right = {
+        case.id
+        for case in judged
+        if (mine := [k for k in case.checks if k.renderer == renderer and k.against == "truth"])
+        and all(check.status is Verdict.PASS for check in mine)
+    }
+    files: set[str] = set()
+    for case in cases:
+        if case.loaded.id in right and case.loaded.case not in files and case.loaded.model.probes:
+            files.add(case.loaded.case)
+            if len(files) > MOST_WITNESSES:
+                return
+            try:
+                evidence = tuple(_truth_as_evidence(case, probe) for probe in _measuring(case))
+            except ValueError:
+                continue  # no closed form
+            yield Witness(case.loaded.id, evidence)
+
+
+def _measuring(case: PreparedCase) -> list[model.Probe]:
+    """The probes of which every ray is checked, not only where light ends."""
+    used = {c.probe for c in case.loaded.model.checks if c.observable not in BOUNDARIES}
+    return [
+        probe
+        for probe in case.loaded.model.probes
+        if probe.name in used and probe.measure != "all-light"
+    ]
+
+
+def _truth_as_evidence(case: PreparedCase, probe: model.Probe) -> Evidence:
+    scene, planes = expand_thin_slabs(case.scene), case.planes(probe)
+    every = primary_rays(scene)
+    rows = np.linspace(0, len(every.origins) - 1, WITNESS_RAYS * 8).astype(int)
+    form = ClosedForm(scene)
+    paths = form.follow(Rays(every.origins[rows], every.directions[rows]), probe.path)
+    on = [form.land(paths, plane) for plane in planes]
+    lands = np.all([landing.status == Status.HIT for landing in on], axis=0)
+    kept = np.flatnonzero(lands)
+    kept = kept[np.linspace(0, len(kept) - 1, min(WITNESS_RAYS, len(kept))).astype(int)]
+    rays = Rays(every.origins[rows[kept]], every.directions[rows[kept]])
+    setting = Setting(scene, rays, rows[kept], probe.path, planes)
+    many = np.ones(len(kept))
+    if probe.measure == "light":
+        level = paths.weight[kept, None] * on[0].transmission[kept]
+        return Levels(setting, level, np.full_like(level, LEVEL_TOLERANCE))
+    return Landings(
+        setting, on[0].point[kept], paths.direction[kept] if len(planes) == 2 else None,
+        np.ones(len(kept), bool), POINT_TOLERANCE * many, DIRECTION_TOLERANCE * many,
+    )  # fmt: skip
