@@ -23,9 +23,10 @@ def ball_crossing(height: Float, radius: float, n: float) -> Float:
 
     It is turned by i - r at both surfaces, i = asin(h / R), r = asin(h / (n R)), and passes the
     centre at distance h before and after, by symmetry; so L = h / sin 2 (i - r). Domain 0 < h < R,
-    h < n R.
+    h < n R; NaN elsewhere.
     """
-    turned = 2 * (np.arcsin(height / radius) - np.arcsin(height / (n * radius)))
+    with np.errstate(invalid="ignore"):
+        turned = 2 * (np.arcsin(height / radius) - np.arcsin(height / (n * radius)))
     return np.asarray(height / np.sin(turned))
 
 

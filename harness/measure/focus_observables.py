@@ -217,8 +217,7 @@ def rainbow_angle(truth: ProbeTruth, rays: RayMeasurement, precision: Precision)
     value = lowest_of_parabola(height[near], measured[near]) - bias
     bound = (rays.direction_uncertainty + truth.direction_tolerance(precision))[near]
     tolerance = float(np.degrees(3 * bound.max()))
-    opposite = 180.0 * reflections
-    bow, true = (abs(opposite - float(np.degrees(x))) for x in (value, least))
+    bow, true = (abs(180.0 - float(np.degrees(x))) for x in (value, least))
     return Comparison(
         bow, true, tolerance, bool(abs(bow - true) <= tolerance) and not fault,
         "tolerance of the direction x 3, the norm of the parabola's vertex over seven samples; "

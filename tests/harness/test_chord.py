@@ -18,7 +18,17 @@ from harness.chord import Body
 from harness.expected import Float
 from harness.intervals import Chord
 from harness.scene.model import Icosphere
-from harness.scene.resolved import Convex, Cylinder, Frame, Mesh, Solid, SolidShape, Sphere
+from harness.scene.resolved import (
+    Cone,
+    Convex,
+    Cylinder,
+    Frame,
+    Lens,
+    Mesh,
+    Solid,
+    SolidShape,
+    Sphere,
+)
 from harness.scene.shapes import solid_shape
 from tests.catalogue import EPS
 
@@ -273,3 +283,98 @@ def test_a_mesh_that_is_not_convex_is_refused() -> None:
 def test_a_smoothly_shaded_mesh_is_refused() -> None:
     with pytest.raises(ValueError, match="no closed form"):
         body(icosphere(1, smooth=True))
+
+
+# --- lenses and cones -----------------------------------------------------------------------------
+
+
+def conicoid_above(p: Float, radius: float | None, conic: float) -> Float:
+    """How far below the face z = sag(r) points are, roughly: positive is below it."""
+    r2 = p[..., 0] ** 2 + p[..., 1] ** 2
+    if radius is None:
+        return np.asarray(-p[..., 2])
+    root = np.sqrt(np.maximum(1 - (1 + conic) * r2 / radius**2, 0))
+    return np.asarray(r2 / (radius * (1 + root)) - p[..., 2])
+
+
+def in_lens(lens: Lens, p: Float) -> Float:
+    """True where points (n, 3) are inside, by the definition of a lens, in its own frame."""
+    lower = conicoid_above(p, lens.radii[0], lens.conics[0]) < 0
+    upper = conicoid_above(p - [0, 0, lens.thickness], lens.radii[1], lens.conics[1]) > 0
+    return np.asarray(lower & upper & (np.hypot(p[..., 0], p[..., 1]) < lens.aperture))
+
+
+LENSES = {
+    "biconvex": ((4.0, -4.0), (0.0, 0.0), 0.8),
+    "biconcave": ((-4.0, 4.0), (0.0, 0.0), 0.3),
+    "plano-convex": ((None, -3.0), (0.0, 0.0), 0.6),
+    "meniscus": ((2.0, 3.0), (0.0, 0.0), 0.4),
+    "ellipsoid": ((3.0, None), (-0.44, 0.0), 1.0),
+    "hyperboloid": ((None, -3.0), (0.0, -2.25), 0.6),
+    "paraboloids": ((3.0, -3.0), (-1.0, -1.0), 0.7),
+    "rod with a round end": ((1.2, None), (0.0, 0.0), 5.0),
+}
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_lenses_are_where_their_definition_says(name: str) -> None:
+    """2000 random lines, each cut at its chords' ends: inside between them, outside elsewhere."""
+    radii, conics, thickness = LENSES[name]
+    place = Frame(origin=(0, 0, 0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    lens = Lens(frame=place, thickness=thickness, radii=radii, conics=conics, aperture=1.0)
+    rng = np.random.default_rng(7)
+    o = rng.normal(size=(2000, 3)) * 2
+    d = rng.normal(size=(2000, 3)) * 0.5 + np.array([0, 0, thickness / 2]) - o
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    parts = body(lens).chords(o, d)
+    t = np.linspace(-12, 12, 1201)
+    for k in range(len(o)):
+        inside = in_lens(lens, o[k] + t[:, None] * d[k])
+        said = np.zeros(len(t), bool)
+        near = np.zeros(len(t), bool)
+        for part in parts:
+            if part.t_in[k] < part.t_out[k]:
+                said |= (t > part.t_in[k]) & (t < part.t_out[k])
+                for end in (part.t_in[k], part.t_out[k]):
+                    near |= np.abs(t - end) < 1e-9
+        assert (said == inside)[~near].all(), (name, k)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_normals_of_lenses_point_outwards(name: str) -> None:
+    radii, conics, thickness = LENSES[name]
+    place = Frame(origin=(0, 0, 0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    lens = Lens(frame=place, thickness=thickness, radii=radii, conics=conics, aperture=1.0)
+    x = np.linspace(-0.95, 0.95, 39)
+    o = np.stack([x, 0.1 + 0 * x, np.full_like(x, -9.0)], axis=1)
+    d = np.tile([0.02, 0.0, 1.0], (len(x), 1)) / math.hypot(0.02, 1)
+    for part in body(lens).chords(o, d):
+        real = part.t_in < part.t_out
+        for t, n in ((part.t_in, part.n_in), (part.t_out, part.n_out)):
+            p = o[real] + t[real, None] * d[real]
+            assert np.abs(np.linalg.norm(n[real], axis=1) - 1).max(initial=0) <= 8 * EPS
+            assert not in_lens(lens, p + 1e-6 * n[real]).any()
+            assert in_lens(lens, p - 1e-6 * n[real]).all()
+
+
+@pytest.mark.parametrize("top", [0.0, 0.4])
+def test_cones(top: float) -> None:
+    place = Frame(origin=(0, 0, 0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    cone = Cone(frame=place, radius=1.0, top_radius=top, height=1.5)
+
+    def inside(p: Float) -> Float:
+        mantle = 1.0 - (1.0 - top) * p[..., 2] / 1.5
+        return np.asarray(
+            (p[..., 2] > 0) & (p[..., 2] < 1.5) & (np.hypot(p[..., 0], p[..., 1]) < mantle)
+        )
+
+    rng = np.random.default_rng(3)
+    o = rng.normal(size=(2000, 3)) * 2
+    d = rng.normal(size=(2000, 3)) * 0.5 + np.array([0, 0, 0.7]) - o
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    (chord,) = body(cone).chords(o, d)
+    t = np.linspace(-12, 12, 1201)
+    for k in range(len(o)):
+        said = (t > chord.t_in[k]) & (t < chord.t_out[k])
+        near = (np.abs(t - chord.t_in[k]) < 1e-9) | (np.abs(t - chord.t_out[k]) < 1e-9)
+        assert (said == inside(o[k] + t[:, None] * d[k]))[~near].all(), k
