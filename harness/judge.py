@@ -36,7 +36,7 @@ from harness.record import Check, Curve, Diagnosis, Verdict
 from harness.renderers.base import Capability
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
-from harness.verdict import judge, unmeasured
+from harness.verdict import check_id, judge, unmeasured
 
 # The chance of a false alarm of one check of a sampled picture, over all of its means. A suite of
 # a hundred such checks cries wolf once in a hundred runs.
@@ -151,6 +151,8 @@ class CaseJudge:
         self, spec: model.CheckSpec, contender: Contender, form: Form
     ) -> tuple[Check, Curve | None]:
         spec = in_form(spec, form)
+        if contender.stored is not None:
+            return self._stored(spec, contender, "truth"), None
         try:
             comparison = self._compare(spec, contender, form)
         except NotAvailable as gap:
@@ -163,6 +165,8 @@ class CaseJudge:
         """Whether the variant shows the same as the case itself, ray by ray."""
         probe, base = self._case.probe(spec.probe), self._probed.forms[0]
         spec = agreement(spec, form)
+        if contender.stored is not None:
+            return self._stored(spec, contender, "variant")
         try:
             both = [
                 (
@@ -178,6 +182,14 @@ class CaseJudge:
         except (Unmeasurable, ValueError) as error:
             return unmeasured(spec, contender.name, "variant", Verdict.ERROR, str(error))
         return judge(spec, contender.name, "variant", comparison)
+
+    def _stored(self, spec: model.CheckSpec, contender: Contender, against: str) -> Check:
+        """The approved result of a renderer that is not there, marked as such."""
+        check = contender.stored_checks.get(check_id(spec, contender.name, against))
+        if check is None or contender.stored is None:
+            reason = f"{contender.reason}; nothing is stored for this check"
+            return unmeasured(spec, contender.name, against, Verdict.SKIP, reason)
+        return check.model_copy(update={"stored": [contender.name]})
 
     def _compare(self, spec: model.CheckSpec, contender: Contender, form: Form) -> Comparison:
         observable, preflight = Observable(spec.observable), contender.ready()
