@@ -129,7 +129,7 @@ def _summary(
         renderers={name: _renderer_summary(session, name) for name in session.names},
         counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
         cases=cases,
-        diagnoses=explain_run([state.case for state in session.states], cases, session.names),
+        diagnoses=explain_run([state.case for state in session.states], cases, contenders),
         effort=session.effort.model_copy(update={"damaged": damaged}),
         interrupted=interrupted,
     )

@@ -72,11 +72,8 @@ def landings(
     truth: ProbeTruth, rays: RayMeasurement, precision: Precision, thin: bool
 ) -> Landings | None:
     """None where no ray says anything."""
-    # Of a ray that is not seen the image's uncertainty is not known, nor needed.
-    point_tolerance = np.nan_to_num(rays.point_uncertainty) + truth.point_tolerance(precision)
-    direction_tolerance = np.nan_to_num(rays.direction_uncertainty) + (
-        truth.direction_tolerance(precision)
-    )
+    point_tolerance = _usual(rays.point_uncertainty) + truth.point_tolerance(precision)
+    direction_tolerance = _usual(rays.direction_uncertainty) + truth.direction_tolerance(precision)
     usable = ~truth.grazing & ~rays.undecided & ~rays.faint & ~rays.mixed & _known(truth)
     error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1) / point_tolerance
     if rays.direction is not None:
@@ -96,6 +93,13 @@ def landings(
         point_tolerance[rows],
         direction_tolerance[rows],
     )
+
+
+def _usual(uncertainty: Float) -> Float:
+    """The uncertainties, and for rays that are not seen the usual one of those that are."""
+    known = uncertainty[np.isfinite(uncertainty)]
+    usual = float(np.median(known)) if len(known) else 1e-7
+    return np.asarray(np.where(np.isfinite(uncertainty), uncertainty, usual))
 
 
 def levels(

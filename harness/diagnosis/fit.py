@@ -21,10 +21,9 @@ from harness.expected import Float
 
 # Rays that a wrong renderer's own edges may have spoilt: those of the truth are left out already.
 TRIMMED = 0.05
-MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 12, 5, 2
-# Steps of the right hypothesis gain most of what is left; one that gains less than this share of
-# its cost by a step is not the one.
-CRAWL = 0.02
+MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 16, 5, 2
+# A step that gains less than this in cost, a factor of 1.6 in likelihood, is the last.
+CRAWL = 0.5
 LARGEST = 1e15  # of a misfit, so that squares stay finite
 
 
@@ -145,7 +144,7 @@ def _descend(at: At, point: _Point, values: Values) -> tuple[_Point, Values, Flo
             break
         gained = point.score - better[0].score
         point, values = better
-        if gained < max(1e-3, CRAWL * point.score):
+        if gained < CRAWL:
             break
     return point, values, curvature
 

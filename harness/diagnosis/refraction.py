@@ -121,13 +121,13 @@ def _by_angle(at: Interface, theta_t: Float) -> tuple[Float, Mask]:
     return bent, total
 
 
-def _linear(at: Interface) -> tuple[Float, Mask]:
-    return _by_angle(at, np.arccos(at.cos_theta_i) * at.ior_i / at.ior_t)
+def _linear(at: Interface) -> Float:
+    return _by_angle(at, np.arccos(at.cos_theta_i) * at.ior_i / at.ior_t)[0]
 
 
-def _literal_table(at: Interface) -> tuple[Float, Mask]:
+def _table(at: Interface) -> Float:
     """The lecture's printed table for every surface, whatever the indices."""
-    return _by_angle(at, lecture_table_angle(np.arccos(at.cos_theta_i)))
+    return _by_angle(at, lecture_table_angle(np.arccos(at.cos_theta_i)))[0]
 
 
 def _degrees(at: Interface) -> tuple[Float, Mask]:
@@ -287,19 +287,29 @@ def _lawless(
     return Hypothesis(name, lambda w, _: _bent_by(w, bend), says(text), applies=applies)
 
 
+def _lawless_pair(
+    name: str, direction: Callable[[Interface], Float], text: str
+) -> tuple[Hypothesis, Hypothesis]:
+    """A wrong direction that always exists, and the same where reflection is not total."""
+    return (
+        _lawless(name, lambda at: (direction(at), np.zeros(len(at.leg), bool)), text),
+        _lawless(
+            f"{name}-but-total",
+            lambda at: (direction(at), snell(at)[1]),
+            f"{text}, but where all light is reflected",
+        ),
+    )
+
+
 REFRACTION = (
     Hypothesis(
         "index", _index, _says_index, ((0.0,), (-0.1,), (0.1,), (-0.3,), (0.4,)), "relative error",
         kin="index",
     ),
     _lawless("ratio-inverted", _inverted, "uses the ratio of indices upside down"),
-    _lawless(
-        "straight-on",
-        lambda at: _straight_where(at, np.ones(len(at.leg), bool)),
-        "does not refract at all: rays go straight on",
-    ),
-    _lawless("linear", _linear, "takes θt = θi n1/n2, as if all angles were small"),
-    _lawless("table", _literal_table, "takes θt = 2/3 θi, as in the lecture's printed table"),
+    *_lawless_pair("straight-on", lambda at: at.direction, "does not refract at all"),
+    *_lawless_pair("linear", _linear, "takes θt = θi n1/n2, as if all angles were small"),
+    *_lawless_pair("table", _table, "takes θt = 2/3 θi, as in the lecture's printed table"),
     _lawless("degrees", _degrees, "gives degrees to a sine that wants radians"),
     _lawless(
         "tangent-reversed", _reversed_tangent,
@@ -340,6 +350,7 @@ REFRACTION = (
     Hypothesis(
         "unsquared", _unsquared,
         lambda f: "does not square the ratio of indices under the root" if f.near(1)
+        else "applies the ratio of indices to tangents instead of sines" if f.near(2)
         else f"raises the ratio under the root to {2 - f.values[0]:.4g} instead of squaring it",
         ((1.0,), (0.1,)), "missing power",
     ),

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.diagnosis.choose import SAME, complexity, no_cause
+from harness.diagnosis.choose import SAME, akin, complexity, first_of_kin, no_cause
 from harness.diagnosis.evidence import Evidence
 from harness.diagnosis.fit import cost_of
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
@@ -72,7 +72,8 @@ def diagnose_run(
 def _ranked(left: Mapping[str, Diagnosis], witnesses: Sequence[Witness]) -> list[_Common]:
     common = sorted((_common(h, left) for h in LIBRARY), key=lambda c: c.total)
     held = [_held_against(c, witnesses) for c in common[:CANDIDATES]]
-    return sorted(held, key=lambda c: c.total)
+    held.sort(key=lambda c: c.total)
+    return first_of_kin(held, lambda c: c.total, lambda c: c.hypothesis)
 
 
 def _fit_of(diagnosis: Diagnosis, name: str) -> CauseFit:
@@ -145,7 +146,7 @@ def _as_diagnosis(
     best = ranked[0]
     mine = {case: left[case] for case in best.explained}
     iors = tuple(sorted({n for d in mine.values() for n in d.iors}))
-    cause, second = _cause(best, mine, iors), next(c for c in ranked if not _akin(c, best))
+    cause, second = _cause(best, mine, iors), _next(ranked)
     other = [case for case in left if case not in best.explained]
     sentence = f"{renderer} {cause.sentence}"
     if len(left) > 1:
@@ -159,8 +160,10 @@ def _as_diagnosis(
     )  # fmt: skip
 
 
-def _akin(a: _Common, b: _Common) -> bool:
-    return a.hypothesis is b.hypothesis
+def _next(ranked: Sequence[_Common]) -> _Common:
+    """The runner-up: the next one that says something else."""
+    best = ranked[0].hypothesis
+    return next((c for c in ranked[1:] if not akin(c.hypothesis, best)), ranked[1])
 
 
 def _deviation(cases: Mapping[str, Diagnosis]) -> float:

@@ -75,6 +75,7 @@ MUTANTS = (
     Mutant("linear", 1.0, ("linear",)),
     Mutant("printed-table", 1.0, ("table",), "the lecture's printed table"),
     Mutant("degrees", 1.0, ("degrees",)),
+    Mutant("tangents", 1.0, ("unsquared",)),
     Mutant("w-is-direction", 1.0, ("tangent-reversed",), "an erratum of the lecture"),
     Mutant("straight", 1.0, ("straight-on",)),
     Mutant("gap-swallowed", 0.02, ("near-surfaces-lost",), "P18 Baikal#142, mitsuba3#1871"),
@@ -138,7 +139,6 @@ MUTANTS = (
 
 # Wrong in ways that no hypothesis knows.
 UNLISTED = (
-    Mutant("tangents", 1.0, (None,)),
     Mutant("twisted", 0.05, (None,)),
     Mutant("coarse-normals", 0.01, (None,)),
     Mutant("index-by-angle", 0.1, (None,)),
