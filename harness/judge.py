@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness import plan
+from harness import plan, spectral
 from harness.attribution import attributed
 from harness.explain import Explainer
 from harness.measure import light_observables, radiance, ray_observables
@@ -74,7 +74,8 @@ class CaseJudge:
         self, case: PreparedCase, contenders: list[Contender], results: Results, helper: str
     ) -> None:
         self._case, self._contenders, self._results = case, contenders, results
-        self._pairs = PairJudge(case.scene, results, helper)
+        gain = spectral.gain(case.wavelengths)
+        self._pairs = PairJudge(case.scene, results, helper, gain)
         self._truths: dict[str, ProbeTruth] = {}
         self._rays: dict[tuple[str, str], RayMeasurement] = {}
 

@@ -15,8 +15,8 @@ from harness.probe.scenes import AXES, code_scene, light_scene
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene import model
 from harness.scene.load import LoadedCase
-from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve
-from harness.scene.resolved import Film, Rectangle, ResolvedScene
+from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve, spectral_media
+from harness.scene.resolved import Film, Medium, Rectangle, ResolvedScene
 
 IMAGE = "image"
 SECOND_IMAGE = "image, second seed"
@@ -40,10 +40,20 @@ class Job:
 
 @dataclass(frozen=True)
 class PreparedCase:
-    """A case with its resolved scene."""
+    """A case with its resolved scene.
+
+    Where it has a spectrum, `passes` are the wavelengths, in nm, of the monochromatic pictures that
+    make up each of its pictures, and the media at each.
+    """
 
     loaded: LoadedCase
     scene: ResolvedScene
+    passes: tuple[tuple[float, tuple[Medium, ...]], ...] = ()
+
+    @property
+    def wavelengths(self) -> tuple[float, ...]:
+        """Of its spectrum, in nm; empty where it has none."""
+        return tuple(wavelength for wavelength, _ in self.passes)
 
     @property
     def wants_images(self) -> bool:
@@ -67,7 +77,7 @@ class PreparedCase:
 
 def prepare(loaded: LoadedCase) -> PreparedCase:
     """Resolves the scene. Raises InputError where it cannot be."""
-    return PreparedCase(loaded, resolve(loaded))
+    return PreparedCase(loaded, resolve(loaded), spectral_media(loaded))
 
 
 def scene_for(scene: ResolvedScene, capabilities: Collection[Capability]) -> ResolvedScene:
@@ -86,14 +96,28 @@ def jobs_of(
     scene = scene_for(case.scene, capabilities)
     jobs = []
     if case.wants_images:
-        jobs.append(Job(renderer, IMAGE, scene, settings))
+        jobs += _picture(case, Job(renderer, IMAGE, scene, settings))
         if preflight.noisy:
             other = replace(settings, seed=settings.seed + 1)
-            jobs.append(Job(renderer, SECOND_IMAGE, scene, other))
+            jobs += _picture(case, Job(renderer, SECOND_IMAGE, scene, other))
     for probe in case.loaded.model.probes:
         planes = case.planes(probe)
         jobs += _probe_jobs(scene, probe, planes, renderer, capabilities, preflight, settings)
     return jobs
+
+
+def _picture(case: PreparedCase, job: Job) -> list[Job]:
+    """The jobs that make up a picture: one, or one per wavelength."""
+    if not case.passes:
+        return [job]
+    return [
+        replace(
+            job,
+            role=pass_role(job.role, wavelength),
+            scene=job.scene.model_copy(update={"media": media}),
+        )
+        for wavelength, media in case.passes
+    ]
 
 
 def _probe_jobs(
@@ -140,7 +164,7 @@ def auxiliary_jobs(
         film = case.scene.film
         fine = Film(width=film.width * AREA_FACTOR, height=film.height * AREA_FACTOR)
         jobs.append(Job(helper, AREA_IMAGE, case.scene.model_copy(update={"film": fine}), settings))
-    return jobs
+    return [part for job in jobs for part in _picture(case, job)]
 
 
 def shifted(scene: ResolvedScene, dx: float, dy: float) -> ResolvedScene:
@@ -149,6 +173,11 @@ def shifted(scene: ResolvedScene, dx: float, dy: float) -> ResolvedScene:
     axes = zip(camera.origin, camera.right, camera.up, strict=True)
     origin = tuple(o + dx * r + dy * u for o, r, u in axes)
     return scene.model_copy(update={"camera": camera.model_copy(update={"origin": origin})})
+
+
+def pass_role(role: str, wavelength: float) -> str:
+    """The role of the monochromatic part of a picture."""
+    return f"{role} at {wavelength:.10g} nm"
 
 
 def light_role(probe: model.Probe) -> str:

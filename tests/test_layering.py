@@ -36,7 +36,7 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight", "attribution"),
     ("report",),
-    ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
+    ("baseline", "plan", "results", "pairs", "explain", "spectral", "judge", "packing", "archive"),
     ("parcel", "memo", "bundle", "lanes", "session", "run"),
     ("doctor",),
     ("show", "cli"),

@@ -102,7 +102,9 @@ class Image:
 
     `variance` (H, W, 3) is the estimated variance of each pixel's mean where the renderer
     samples, else None. `closest` (H, W) is the shortest way between two surfaces, in scene units,
-    on any ray of the pixel whose loss would show; None where the renderer does not tell.
+    on any ray of the pixel whose loss would show; None where the renderer does not tell. `cut` is
+    the mean over the pixels of the weight that was not followed, for min_weight or max_depth; None
+    where the renderer does not tell.
     """
 
     pixels: NDArray[np.float32]
@@ -111,6 +113,7 @@ class Image:
     log: str = ""
     command: str = ""  # what was run, for people to run again
     closest: NDArray[np.float32] | None = None
+    cut: float | None = None
 
 
 @dataclass(frozen=True)

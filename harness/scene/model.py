@@ -11,6 +11,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from harness.scene.media_model import Medium as Medium
+from harness.scene.media_model import Spectrum as Spectrum
+from harness.scene.media_model import Wavelength
 from harness.scene.shape_model import FARTHEST as FARTHEST
 from harness.scene.shape_model import AsMesh as AsMesh
 from harness.scene.shape_model import Box as Box
@@ -108,13 +111,6 @@ Material = Annotated[
 
 
 # --- the scene ------------------------------------------------------------------------------------
-
-
-class Medium(Strict):
-    """`absorption` per scene unit and colour channel: T = exp(-absorption L)."""
-
-    ior: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)]
-    absorption: Rgb = (0, 0, 0)
 
 
 class Solid(Strict):
@@ -240,6 +236,8 @@ class Case(Strict):
     film: Film = Film()
     camera: Camera
     background: Rgb = (0, 0, 0)
+    wavelength: Wavelength = 587.5618
+    spectrum: Spectrum | None = None
     media: dict[Name, Medium] = Field(default_factory=dict)
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()

@@ -163,7 +163,8 @@ EDITS = {
     ),
     "missing key": (
         "ior = 1.5", "",
-        12, "media.glass.ior", "missing", None, "a number ≥ 0.001 and ≤ 1000", None,
+        12, "media.glass.ior", "missing", None,
+        "a number ≥ 0.001 and ≤ 1000, or one of glass, sellmeier, cauchy, abbe instead", None,
     ),
     "missing table": (
         '[camera]\ntype = "perspective"\norigin = [0, 0, 6]\ntarget = [0, 0, 0]\nfov_x = 30', "",
