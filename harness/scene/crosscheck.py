@@ -11,7 +11,9 @@ from functools import cache
 
 from harness.errors import nearest
 from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
     IMAGE_OBSERVABLES,
+    IMPLIED_OBSERVABLES,
     LIGHT_OBSERVABLES,
     TRUTH_OBSERVABLES,
     Observable,
@@ -22,7 +24,7 @@ from harness.scene.findings import Finding, KeyPath, quoted
 WAYS = ("ior", "glass", "sellmeier", "cauchy", "abbe")  # in which a medium says its index
 AIR = "air"  # what surrounds everything; a scene may define it otherwise
 AGAINST = frozenset({"truth", "renderers"})
-OBSERVABLES = frozenset(observable.value for observable in Observable)
+OBSERVABLES = frozenset(o.value for o in Observable if o not in IMPLIED_OBSERVABLES)
 BUILT_IN = frozenset({"tracer", "povray", "mitsuba", "mitsuba-exact"})
 
 MOST_NAMES = 30  # that a message lists
@@ -43,6 +45,7 @@ def cross_findings(document: Table, renderers: Collection[str] = ()) -> list[Fin
     return [
         *_repeated_names(document),
         *_media(document),
+        *_variants(document),
         *_checks(document, registered_renderers().union(renderers)),
     ]
 
@@ -77,7 +80,7 @@ def _reference(path: KeyPath, name: str | None, known: Collection[str] | None) -
 
 
 def _repeated_names(document: Table) -> Iterator[Finding]:
-    for group in ("solids", "surfaces", "probes"):
+    for group in ("solids", "surfaces", "probes", "variants"):
         seen: set[str] = set()
         for index, row in _rows(document, group):
             name = _text(row, "name")
@@ -113,6 +116,14 @@ def _index(path: KeyPath, medium: Table) -> Iterator[Finding]:
     elif len(said) > 1:
         expected = f"either {said[0]} or {said[1]}"
         yield Finding((*path, said[1]), "the index is said twice", None, expected)
+
+
+def _variants(document: Table) -> Iterator[Finding]:
+    names = {_text(row, "name") for _, row in _rows(document, "solids")}
+    known = None if None in names else {name for name in names if name}
+    for index, variant in _rows(document, "variants"):
+        for solid in _table(variant, "shapes"):
+            yield from _reference(("variants", index, "solid"), solid, known)
 
 
 def _checks(document: Table, renderers: frozenset[str]) -> Iterator[Finding]:
@@ -163,11 +174,18 @@ def _probe(
         expected = ", ".join(sorted(probes or ())) or "a probe that the scene defines"
         yield Finding(where, "missing", None, expected)
         return
-    measure = "light" if observable in LIGHT_OBSERVABLES else "position"
+    measure = measure_of(observable)
     probe = probes.get(name) if probes is not None and isinstance(name, str) else None
     if probe is not None and probe.get("measure", "position") != measure:
         expected = f'a probe with measure = "{measure}"'
         yield Finding(where, f"{observable} needs another probe", quoted(name), expected)
+
+
+def measure_of(observable: Observable) -> str:
+    """What a probe must measure for `observable`."""
+    if observable in ALL_LIGHT_OBSERVABLES:
+        return "all-light"
+    return "light" if observable in LIGHT_OBSERVABLES else "position"
 
 
 def _known(deviation: Table, path: KeyPath, renderers: Collection[str]) -> Iterator[Finding]:
