@@ -71,13 +71,13 @@ class Compound:
     radius: float
 
 
-Solid = Sphere | Cell | Compound
+Analytic = Sphere | Cell | Compound
 
 
 # --- set operations -------------------------------------------------------------------------------
 
 
-def _where(solid: Solid) -> Where:
+def _where(solid: Analytic) -> Where:
     match solid:
         case Sphere(center, radius):
             return Side(Quadric(center, (0.0, 0.0, 1.0), radius * radius, 0.0, -1.0))
@@ -98,25 +98,25 @@ def _outside(where: Where) -> Where:
             return AllOf(tuple(map(_outside, parts)))
 
 
-def union(*solids: Solid) -> Compound:
+def union(*solids: Analytic) -> Compound:
     """What is inside any of the solids. Faces that they share are no faces of it."""
     center, radius = _ball_around(solids)
     return Compound(AnyOf(tuple(map(_where, solids))), center, radius)
 
 
-def intersection(*solids: Solid) -> Compound:
+def intersection(*solids: Analytic) -> Compound:
     """What is inside all of the solids."""
     smallest = min(solids, key=lambda solid: solid.radius)
     return Compound(AllOf(tuple(map(_where, solids))), smallest.center, smallest.radius)
 
 
-def difference(solid: Solid, *without: Solid) -> Compound:
+def difference(solid: Analytic, *without: Analytic) -> Compound:
     """What is inside of one solid, and outside of all others."""
     parts = (_where(solid), *(_outside(_where(other)) for other in without))
     return Compound(AllOf(parts), solid.center, solid.radius)
 
 
-def _ball_around(solids: Sequence[Solid]) -> tuple[Vec, float]:
+def _ball_around(solids: Sequence[Analytic]) -> tuple[Vec, float]:
     centers = np.array([solid.center for solid in solids])
     radii = np.array([solid.radius for solid in solids])
     low, high = (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)

@@ -56,9 +56,16 @@ def _camera(
             return tracer.camera.Orthographic(*axes, camera.width)
 
 
-def _solid_shape(
-    shape: resolved.SolidShape,
-) -> tracer.scene.SolidShape:
+def _solid_shape(shape: resolved.SolidShape) -> tracer.scene.SolidShape:
+    if isinstance(shape, resolved.Mesh):
+        normals = None if shape.normals is None else np.array(shape.normals, float)
+        return tracer.mesh.Mesh(
+            np.array(shape.vertices, float), np.array(shape.triangles, np.int64), normals
+        )
+    return _analytic(shape)
+
+
+def _analytic(shape: resolved.Analytic) -> tracer.solids.Analytic:
     match shape:
         case resolved.Sphere():
             return tracer.shapes.Sphere(shape.center, shape.radius)
@@ -82,11 +89,19 @@ def _solid_shape(
                 shape.aperture,
                 shape.conics,
             )
-        case resolved.Mesh():
-            normals = None if shape.normals is None else np.array(shape.normals, float)
-            return tracer.mesh.Mesh(
-                np.array(shape.vertices, float), np.array(shape.triangles, np.int64), normals
-            )
+        case resolved.Csg():
+            return _composed(shape)
+
+
+def _composed(shape: resolved.Csg) -> tracer.solids.Compound:
+    first, *others = map(_analytic, shape.parts)
+    match shape.operation:
+        case "union":
+            return tracer.solids.union(first, *others)
+        case "intersection":
+            return tracer.solids.intersection(first, *others)
+        case "difference":
+            return tracer.solids.difference(first, *others)
 
 
 def _shape(shape: resolved.SurfaceShape) -> tracer.scene.Shape:
