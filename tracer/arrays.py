@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ from tracer.errors import SceneError
 from tracer.mesh import LEFT, RIGHT, WORDS, Mesh, Tree, grow_tree, require_closed
 from tracer.patterns import Constant, Picture, pattern_row
 from tracer.scene import (
-    VACUUM,
     Diffuse,
     Emissive,
     Material,
@@ -20,11 +20,13 @@ from tracer.scene import (
     Scene,
     Shape,
     Solid,
+    SolidShape,
     Surface,
     ThinSlab,
     Translucent,
 )
-from tracer.shapes import COLUMNS, Disk, Rectangle, Sphere, bound_row, face_row
+from tracer.shapes import COLUMNS, HOLLOW, Disk, Quadric, Rectangle, Sphere, bound_row, face_row
+from tracer.shared import Bound, Surfaces
 from tracer.solids import Cell, Compound, compound_rows
 
 Floats = NDArray[np.float64]
@@ -34,17 +36,25 @@ SPHERE, CELL, COMPOUND, MESH, RECTANGLE, DISK = range(6)
 DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
+# MEDIUM and EXTERIOR are what a thin slab is made of and what is around it. In a solid, the k-th of
+# them, the medium is k + 1, so that it also says in which solid a ray is.
 SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS = range(8)
+AMBIENT = 0  # the medium around all solids
 
 
 class Arrays(NamedTuple):
-    """One row of `objects`, `balls` and `materials` per solid, then per surface."""
+    """One row of `objects`, `balls` and `materials` per solid, then per surface.
+
+    Solids are in the order of their rank: where several overlap, the first is there.
+    """
 
     objects: NDArray[np.int64]  # (n, 8)
     balls: Floats  # (n, 4): centre and squared radius of a sphere around it
     materials: Floats  # (n, 7): two colours and a thickness
     rows: Floats  # shapes
+    same: NDArray[np.int64]  # of each row, the number of its surface; negative on its other side
     media: Floats  # (m, 4): ior, absorption
+    solids: int
     patterns: Floats
     texels: Floats
     lights: Floats  # (l, 6): position, intensity
@@ -63,26 +73,43 @@ class _Flattener:
         self.balls: list[list[float]] = []
         self.materials: list[list[float]] = []
         self.rows: list[list[float]] = []
+        self.same: list[int] = []
         self.media: list[Medium] = []
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
         self.trees: list[Tree] = []
-        self.nodes = self.triangles = self.normals = self.texel_count = 0
+        self.nodes = self.triangles = self.normals = self.texel_count = self.surface_count = 0
+
+    def solids(self, solids: list[Solid]) -> None:
+        """Solids in the order of their rank."""
+        surfaces = Surfaces()
+        found = [
+            [surfaces.find(bound, _reach(solid.shape)) for bound in _bounds(solid.shape)]
+            for solid in solids
+        ]
+        times = Counter(abs(number) for bounds in found for _, number in bounds)
+        self.surface_count = surfaces.count
+        for k, (solid, bounds) in enumerate(zip(solids, found, strict=True)):
+            self.media.append(solid.medium)
+            shape = solid.shape
+            if isinstance(shape, Mesh):
+                require_closed(shape, solid.name)
+            if isinstance(shape, Sphere) and times[abs(bounds[0][1])] > 1:
+                # As other solids meet that surface, to the last bit.
+                shape = Cell((bounds[0][0],), shape.center, shape.radius)
+            self._object(shape, DIELECTRIC, (1 + k, AMBIENT), -1, [0.0] * 7, bounds)
 
     def medium(self, medium: Medium) -> int:
-        if medium not in self.media:
-            self.media.append(medium)
-        return self.media.index(medium)
-
-    def solid(self, solid: Solid) -> None:
-        if isinstance(solid.shape, Mesh):
-            require_closed(solid.shape, solid.name)
-        media = self.medium(solid.medium), self.medium(solid.exterior)
-        self._object(solid.shape, DIELECTRIC, media, -1, [0.0] * 7)
+        self.media.append(medium)
+        return len(self.media) - 1
 
     def surface(self, surface: Surface) -> None:
         kind, media, pattern, row = self._material(surface)
-        self._object(surface.shape, kind, media, pattern, row)
+        bounds = _bounds(surface.shape)
+        numbers = range(self.surface_count + 1, self.surface_count + 1 + len(bounds))
+        self.surface_count += len(bounds)
+        found = list(zip(bounds, numbers, strict=True))
+        self._object(surface.shape, kind, media, pattern, row, found)
 
     def _material(self, surface: Surface) -> tuple[int, tuple[int, int], int, list[float]]:
         material: Material = surface.material
@@ -121,28 +148,28 @@ class _Flattener:
         media: tuple[int, int],
         pattern: int,
         material_row: list[float],
+        found: list[tuple[Bound, int]],
     ) -> None:
-        first, count, normals = len(self.rows), 1, -1
+        """`found` has the shape's bounds and the numbers of the surfaces that they are."""
+        first, count, normals = len(self.rows), max(1, len(found)), -1
         ball = [0.0, 0.0, 0.0, np.inf]
+        rows = [bound_row(bound) for bound, _ in found]
         match shape:
             case Sphere(center, radius):
-                kind = SPHERE
-                self.rows.append([*center, radius])
-            case Cell(bounds, center, radius):
-                kind, count = CELL, len(bounds)
-                ball = [*center, radius * radius * (1.0 + 1e-9)]
-                self.rows += [bound_row(bound) for bound in bounds]
+                kind, rows = SPHERE, [[*center, radius]]
+            case Cell(_, center, radius):
+                kind, ball = CELL, [*center, radius * radius * (1.0 + 1e-9)]
             case Compound(where, center, radius):
-                rows = compound_rows(where)
-                kind, count = COMPOUND, len(rows)
-                ball = [*center, radius * radius * (1.0 + 1e-9)]
-                self.rows += rows
+                kind, ball = COMPOUND, [*center, radius * radius * (1.0 + 1e-9)]
+                for row, decisions in zip(rows, compound_rows(where)[1], strict=True):
+                    row += [0.0] * (HOLLOW - len(row)) + decisions
             case Rectangle() | Disk():
-                kind = DISK if isinstance(shape, Disk) else RECTANGLE
-                self.rows.append(face_row(shape))
+                kind, rows = DISK if isinstance(shape, Disk) else RECTANGLE, [face_row(shape)]
             case Mesh():
                 kind, first, count = MESH, self.nodes, self.triangles
                 normals = self._tree(grow_tree(shape))
+        self.rows += rows
+        self.same += [number for _, number in found] or [0] * len(rows)
         self.objects.append([kind, first, count, material, *media, pattern, normals])
         self.balls.append(ball)
         self.materials.append(material_row)
@@ -159,6 +186,37 @@ class _Flattener:
         return first_normal
 
 
+def ranked(solids: tuple[Solid, ...]) -> list[Solid]:
+    """By falling priority, and of equal ones the smaller before the larger."""
+    return sorted(solids, key=lambda solid: (-solid.priority, _size(solid.shape)))
+
+
+def _bounds(shape: Shape) -> list[Bound]:
+    match shape:
+        case Sphere(center, radius):
+            return [Quadric(center, (0.0, 0.0, 1.0), radius * radius, 0.0, -1.0)]
+        case Cell(bounds):
+            return list(bounds)
+        case Compound(where):
+            return compound_rows(where)[0]
+    return []
+
+
+def _reach(shape: Shape) -> float:
+    """How large coordinates of an analytic shape get."""
+    match shape:
+        case Sphere(center, radius) | Cell(_, center, radius) | Compound(_, center, radius):
+            return max(map(abs, center)) + radius
+    return 0.0
+
+
+def _size(shape: SolidShape) -> float:
+    """The radius of a sphere around it."""
+    if isinstance(shape, Mesh):
+        return float(np.linalg.norm(np.ptp(shape.vertices, axis=0))) / 2.0
+    return shape.radius
+
+
 def _table(rows: list[list[float]], columns: int) -> Floats:
     table = np.zeros((len(rows), columns))
     for k, row in enumerate(rows):
@@ -170,7 +228,7 @@ _kept: list[tuple[Scene, Arrays]] = []  # the last scene and its arrays
 
 
 def flatten(scene: Scene) -> Arrays:
-    """Raises SceneError for what cannot be traced. `media[0]` is what the camera stands in.
+    """Raises SceneError for what cannot be traced.
 
     The last scene's arrays are kept, so that following rays through it in turn grows its trees
     once. The numpy arrays of a scene must not be changed afterwards.
@@ -185,10 +243,8 @@ def flatten(scene: Scene) -> Arrays:
 
 def _flatten(scene: Scene) -> Arrays:
     into = _Flattener()
-    into.medium(scene.around_camera)
-    into.medium(VACUUM)
-    for solid in scene.solids:
-        into.solid(solid)
+    into.medium(scene.ambient)
+    into.solids(ranked(scene.solids))
     for surface in scene.surfaces:
         into.surface(surface)
     trees = into.trees or [_NO_TREE]
@@ -198,7 +254,9 @@ def _flatten(scene: Scene) -> Arrays:
         balls=_table(into.balls, 4),
         materials=_table(into.materials, 7),
         rows=_table(into.rows, COLUMNS),
+        same=np.array(into.same, np.int64),
         media=_table([[m.ior, *m.absorption] for m in into.media], 4),
+        solids=len(scene.solids),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([[*light.position, *light.intensity] for light in scene.lights], 6),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracer.arrays import Arrays, Floats, flatten
 from tracer.camera import camera_row, pixel_centre, primary_ray
 from tracer.compiled import compiled, inlined
-from tracer.hit import NOTHING, nearest_hit, new_stack
+from tracer.hit import NOTHING, UNKNOWN, nearest_hit, new_stack
 from tracer.light import absorbed
 from tracer.scene import Scene
 from tracer.shapes import vec_at
@@ -98,20 +98,20 @@ def _worth(ray: Ray, limits: Limits) -> tuple[bool, float]:
 def radiance(
     scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
 ) -> tuple[Vec, float, float]:
-    """(radiance that arrives at `o` against `d`, weight cut, closest); starts in medium 0."""
+    """(radiance that arrives at `o` against `d`, weight cut, closest)."""
     seen, cut, closest, height = BLACK, 0.0, np.inf, 0
-    ray = Ray(o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
+    ray = Ray(o, d, (1.0, 1.0, 1.0), 1, UNKNOWN, NOTHING, -1, False)
     while True:
-        hit, face, t, entering = nearest_hit(
-            scene, ray.o, ray.d, ray.left, ray.left_face, ray.inward, stack
+        hit, face, t, entering, medium, beyond = nearest_hit(
+            scene, ray.o, ray.d, ray.medium, ray.left, ray.left_face, ray.inward, stack
         )
-        weight = mul(ray.weight, absorbed(scene.media, ray.medium, t))
+        weight = mul(ray.weight, absorbed(scene.media, medium, t))
         if hit == NOTHING:
             seen = add(seen, mul(weight, vec_at(scene.background, 0, 0)))
         else:
             if ray.segments > 1 and t < closest and max(weight[0], weight[1], weight[2]) >= TELLING:
                 closest = t
-            at = scatter(scene, lobes, ray.o, t, ray.d, ray.medium, hit, face, entering, stack)
+            at = scatter(scene, lobes, ray.o, t, ray.d, medium, hit, face, entering, beyond, stack)
             seen = add(seen, mul(weight, at.sent))
             reflected = Ray(
                 at.p,

@@ -36,11 +36,16 @@ VACUUM = Medium(1.0)
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shape filled with `medium`, lying wholly inside `exterior`."""
+    """A closed shape filled with `medium`.
+
+    Where solids overlap, the one of highest `priority` is there; of equal ones the smallest, so
+    that what lies wholly inside another needs none. Faces that two solids share are one interface
+    between their media.
+    """
 
     shape: SolidShape
     medium: Medium
-    exterior: Medium = VACUUM
+    priority: int = 0
     name: str = "solid"
 
 
@@ -145,5 +150,5 @@ class Scene:
     surfaces: tuple[Surface, ...] = ()
     lights: tuple[PointLight, ...] = ()
     background: Vec = (0.0, 0.0, 0.0)
-    around_camera: Medium = VACUUM
+    ambient: Medium = VACUUM  # around all solids
     transport: Transport = field(default_factory=Transport)

@@ -24,6 +24,7 @@ from tracer.errors import SceneError
 from tracer.vector import Vec, along, dot, normalise, scale, sub
 
 Rows = NDArray[np.float64]
+Ints = NDArray[np.int64]
 INF = math.inf
 PLANE, QUADRIC = 0.0, 1.0
 COLUMNS = 14  # of the table that all shapes are written to
@@ -208,42 +209,53 @@ def bound_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[fl
 
 @inlined
 def cell_stretch(
-    o: Vec, d: Vec, rows: Rows, first: int, count: int, left: int
+    o: Vec, d: Vec, rows: Rows, same: Ints, first: int, count: int, leaving: int
 ) -> tuple[float, int, float, int]:
     """(enter, row entered through, leave, row left through) of what is inside `count` bounds.
 
-    If the ray starts on the bound in row `left` and points inwards, enter is 0.
+    The ray starts on the surface of number `leaving` (0: on none), and points to the inside of the
+    bounds that are this surface; to the outside if it is negative. `same` has their numbers.
     """
     enter, row_in, leave, row_out = -INF, -1, INF, -1
     for row in range(first, first + count):
-        t0, t1 = bound_stretch(o, d, rows, row, row == left)
+        if leaving != 0 and same[row] == -leaving:
+            return INF, -1, -INF, -1  # a convex bound is not met again
+        t0, t1 = bound_stretch(o, d, rows, row, same[row] == leaving)
         if t0 > enter:
             enter, row_in = t0, row
         if t1 < leave:
             leave, row_out = t1, row
-    if left >= 0:
-        return 0.0, left, max(leave, 0.0), row_out
     return enter, row_in, leave, row_out
 
 
 @called
 def compound_hit(
-    o: Vec, d: Vec, rows: Rows, first: int, count: int, left: int, inward: bool, stretches: Rows
+    o: Vec,
+    d: Vec,
+    rows: Rows,
+    same: Ints,
+    first: int,
+    count: int,
+    leaving: int,
+    known_inside: bool,
+    stretches: Rows,
 ) -> tuple[float, int, bool]:
     """(distance, row, entering) where a ray next enters or leaves a compound of `count` bounds.
 
-    The ray has just left the bound in row `left` (-1: has not) and heads into the solid if
-    `inward`. `stretches` is scratch. Infinite distance where the solid is not met again.
+    `leaving` and `same` as in `cell_stretch`; `known_inside` says that the ray starts in the solid,
+    whatever rounding makes of it. `stretches` is scratch. Infinite distance where the solid is not
+    met again.
     """
     for k in range(count):
         row = first + k
-        if row == left and inward == (rows[row, HOLLOW] != 0.0):
-            stretches[k, 0], stretches[k, 1] = -INF, 0.0  # a convex bound is not met again
+        if leaving != 0 and same[row] == -leaving:
+            stretches[k, 0], stretches[k, 1] = -INF, 0.0
         else:
-            stretches[k, 0], stretches[k, 1] = bound_stretch(o, d, rows, row, row == left)
+            t0, t1 = bound_stretch(o, d, rows, row, same[row] == leaving)
+            stretches[k, 0], stretches[k, 1] = t0, t1
     t = 0.0
     inside = _inside_after(rows, first, stretches, t)
-    if left >= 0 and inward and not inside:  # rounding put the exit behind the ray
+    if known_inside and not inside:
         return 0.0, _left_behind(rows, first, count, stretches), False
     while True:
         crossing = INF

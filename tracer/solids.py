@@ -15,16 +15,12 @@ import numpy as np
 
 from tracer.errors import SceneError
 from tracer.shapes import (
-    COLUMNS,
-    HOLLOW,
-    IF_INSIDE,
     INF,
     INSIDE,
     OUTSIDE,
     Plane,
     Quadric,
     Sphere,
-    bound_row,
     require_positive,
 )
 from tracer.vector import Vec
@@ -125,19 +121,20 @@ def _ball_around(solids: Sequence[Analytic]) -> tuple[Vec, float]:
     return (x, y, z), float(reach.max())
 
 
-def compound_rows(where: Where) -> list[list[float]]:
-    """A row for each bound, with what to look at next: short-circuit evaluation, written out."""
+def compound_rows(where: Where) -> tuple[list[Bound], list[list[float]]]:
+    """(bounds, what to look at next after each): short-circuit evaluation, written out.
+
+    The numbers belong into the columns from HOLLOW on.
+    """
+    bounds: list[Bound] = []
     rows: list[list[float]] = []
 
     def write(part: Where, if_true: int, if_false: int) -> None:
         match part:
             case Side(bound, hollow):
-                row = bound_row(bound)
-                row += [0.0] * (COLUMNS - len(row))
-                row[HOLLOW] = float(hollow)
                 decided = (if_false, if_true) if hollow else (if_true, if_false)
-                row[IF_INSIDE : IF_INSIDE + 2] = map(float, decided)
-                rows.append(row)
+                bounds.append(bound)
+                rows.append([float(hollow), *map(float, decided)])
             case AllOf(parts) | AnyOf(parts):
                 *others, last = parts
                 for one in others:
@@ -149,7 +146,7 @@ def compound_rows(where: Where) -> list[list[float]]:
                 write(last, if_true, if_false)
 
     write(where, INSIDE, OUTSIDE)
-    return rows
+    return bounds, rows
 
 
 def _count(where: Where) -> int:

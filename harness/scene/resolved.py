@@ -280,6 +280,7 @@ class Solid(Frozen):
     shape: SolidShape
     medium: int
     exterior: int
+    priority: int = 0
 
 
 class Surface(Frozen):

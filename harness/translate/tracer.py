@@ -24,7 +24,7 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
     return tracer.scene.Scene(
         camera=_camera(scene.camera),
         solids=tuple(
-            tracer.scene.Solid(_solid_shape(s.shape), media[s.medium], media[s.exterior], s.name)
+            tracer.scene.Solid(_solid_shape(s.shape), media[s.medium], s.priority, s.name)
             for s in scene.solids
         ),
         surfaces=tuple(
@@ -35,7 +35,7 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
             tracer.scene.PointLight(light.position, light.intensity) for light in scene.lights
         ),
         background=scene.background,
-        around_camera=media[scene.camera.medium],
+        ambient=media[0],
         transport=tracer.scene.Transport(
             max_depth=transport.max_depth,
             min_weight=transport.min_weight,
