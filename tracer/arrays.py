@@ -52,7 +52,6 @@ class Arrays(NamedTuple):
     balls: Floats  # (n, 4): centre and squared radius of a sphere around it
     materials: Floats  # (n, 7): two colours and a thickness
     rows: Floats  # shapes
-    same: NDArray[np.int64]  # of each row, the number of its surface; negative on its other side
     media: Floats  # (m, 4): ior, absorption
     solids: int
     patterns: Floats
@@ -73,7 +72,6 @@ class _Flattener:
         self.balls: list[list[float]] = []
         self.materials: list[list[float]] = []
         self.rows: list[list[float]] = []
-        self.same: list[int] = []
         self.media: list[Medium] = []
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
@@ -153,7 +151,7 @@ class _Flattener:
         """`found` has the shape's bounds and the numbers of the surfaces that they are."""
         first, count, normals = len(self.rows), max(1, len(found)), -1
         ball = [0.0, 0.0, 0.0, np.inf]
-        rows = [bound_row(bound) for bound, _ in found]
+        rows = [bound_row(bound, number) for bound, number in found]
         match shape:
             case Sphere(center, radius):
                 kind, rows = SPHERE, [[*center, radius]]
@@ -169,7 +167,6 @@ class _Flattener:
                 kind, first, count = MESH, self.nodes, self.triangles
                 normals = self._tree(grow_tree(shape))
         self.rows += rows
-        self.same += [number for _, number in found] or [0] * len(rows)
         self.objects.append([kind, first, count, material, *media, pattern, normals])
         self.balls.append(ball)
         self.materials.append(material_row)
@@ -254,7 +251,6 @@ def _flatten(scene: Scene) -> Arrays:
         balls=_table(into.balls, 4),
         materials=_table(into.materials, 7),
         rows=_table(into.rows, COLUMNS),
-        same=np.array(into.same, np.int64),
         media=_table([[m.ior, *m.absorption] for m in into.media], 4),
         solids=len(scene.solids),
         patterns=_table(into.patterns, 9),

@@ -25,6 +25,7 @@ from tracer.mesh import STACK, mesh_hit, smooth_normal, triangle_normal
 from tracer.shapes import (
     HOLLOW,
     INF,
+    NUMBER,
     bound_normal,
     cell_stretch,
     compound_hit,
@@ -113,12 +114,14 @@ def _next_hit(
         on_face = left_face if i == left else -1
         t_max = INF if i < scene.solids else best
         t, i_face, enters = _object_hit(scene, i, o, d, on_face, inward, leaving, t_max, stack)
+        if t == INF:
+            continue
         if i < scene.solids:
             if t < best:
                 beyond = 1 + i if before == AMBIENT and enters else before
-            elif beyond == AMBIENT and t < INF and enters == (t == best):
+            elif beyond == AMBIENT and enters == (t == best):
                 beyond = 1 + i
-            if before == AMBIENT and t < INF and not enters:
+            if before == AMBIENT and not enters:
                 before = 1 + i
         if t < best:
             best, hit, face, entering = t, i, i_face, enters
@@ -130,17 +133,17 @@ def _next_hit(
 
 
 @inlined
-def _surface_left(scene: Arrays, left: int, left_face: int, inward: bool) -> int:
+def _surface_left(scene: Arrays, left: int, left_face: int, inward: bool) -> float:
     """The number of the surface that a ray has left, which solids may share.
 
     Positive if it points to the inside of that surface; 0 where no other solid has it.
     """
     if left == NOTHING:
-        return 0
+        return 0.0
     kind = scene.objects[left, SHAPE]
     if kind != CELL and kind != COMPOUND:
-        return 0
-    number = int(scene.same[left_face])
+        return 0.0
+    number = float(scene.rows[left_face, NUMBER])
     return number if inward == (scene.rows[left_face, HOLLOW] == 0.0) else -number
 
 
@@ -152,7 +155,7 @@ def _object_hit(
     d: Vec,
     on_face: int,
     inward: bool,
-    leaving: int,
+    leaving: float,
     t_max: float,
     stack: Floats,
 ) -> tuple[float, int, bool]:
@@ -211,15 +214,13 @@ def _far_from_ball(scene: Arrays, i: int, o: Vec, d: Vec) -> bool:
 
 @inlined
 def _cell_hit(
-    scene: Arrays, i: int, o: Vec, d: Vec, leaving: int, inwards: bool
+    scene: Arrays, i: int, o: Vec, d: Vec, leaving: float, inwards: bool
 ) -> tuple[float, int, bool]:
     """`inwards`: the ray has just left one of the cell's faces, heading into it."""
     if not inwards and _far_from_ball(scene, i, o, d):
         return INF, -1, False
     first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
-    enter, face_in, leave, face_out = cell_stretch(
-        o, d, scene.rows, scene.same, first, count, leaving
-    )
+    enter, face_in, leave, face_out = cell_stretch(o, d, scene.rows, first, count, leaving)
     if inwards:  # rounding may put the exit behind the ray
         return max(leave, 0.0), face_out, False
     if enter >= leave or leave <= 0.0:
@@ -231,12 +232,12 @@ def _cell_hit(
 
 @inlined
 def _compound_hit(
-    scene: Arrays, i: int, o: Vec, d: Vec, leaving: int, known_inside: bool, stack: Floats
+    scene: Arrays, i: int, o: Vec, d: Vec, leaving: float, known_inside: bool, stack: Floats
 ) -> tuple[float, int, bool]:
     if _far_from_ball(scene, i, o, d):
         return INF, -1, False
     first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
-    return compound_hit(o, d, scene.rows, scene.same, first, count, leaving, known_inside, stack)
+    return compound_hit(o, d, scene.rows, first, count, leaving, known_inside, stack)
 
 
 @inlined
