@@ -5,13 +5,15 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import platform
 from collections.abc import Iterator, Mapping
 from itertools import combinations
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
 from harness import __version__, plan, record
+from harness.documents import PARTIAL
 from harness.errors import RendererError, RendererFailed
 from harness.judge import Judgement
 from harness.measure.images import Pixels
@@ -22,8 +24,10 @@ from harness.probe.view import view_of_codes, view_of_rays
 from harness.record import CaseRecord, DifferenceMap, ImageFile, RendererRun, Table, Verdict, worst
 from harness.renderers.base import Image, RayPaths, RenderSettings
 from harness.results import Contender, Results
+from harness.scene.fingerprint import fingerprint
 
 LOG_LINES = 40
+PLATFORM = f"{platform.system()} {platform.machine()}"
 # The range of all difference maps, so that they can be compared: a float32 renderer's errors show
 # as dark, what an eye could see as bright. Noise of a sampled picture needs a wider one.
 DIFFERENCE_LIMIT = 1e-3
@@ -34,6 +38,18 @@ def folder_name(case_id: str) -> str:
     """A file name for a case: letters, digits and ``._-`` only, and unique."""
     plain = "".join(c if c.isalnum() or c in "._-" else "_" for c in case_id)[:80]
     return f"{plain}-{hashlib.sha256(case_id.encode()).hexdigest()[:8]}"
+
+
+def belongs(path: str, name: str) -> bool:
+    """Whether a path relative to a run's folder is of the case whose `folder_name` is `name`.
+
+    All that is written for a case is ``FOLDER/NAME.…`` or ``FOLDER/NAME/…``; the report's pages in
+    ``cases/`` are made anew from that.
+    """
+    parts = PurePosixPath(path).parts
+    if len(parts) < 2 or parts[0] in ("/", "cases") or ".." in parts:
+        return False
+    return parts[1].startswith(f"{name}.") if len(parts) == 2 else parts[1] == name
 
 
 class Archive:
@@ -57,6 +73,7 @@ class Archive:
     ) -> CaseRecord:
         """Writes the images of a case, its scene and its record; returns the record."""
         loaded, name = case.loaded, folder_name(case.loaded.id)
+        self.discard(name)
         scene_json = case.scene.model_dump_json()
         record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
         runs = [self._run(case, c, name, results, judgement, seconds, settings) for c in contenders]
@@ -75,7 +92,10 @@ class Archive:
             formula=loaded.model.formula,
             parameters=dict(loaded.parameters),
             scene_sha256=hashlib.sha256(scene_json.encode()).hexdigest(),
+            scene_fingerprint=fingerprint(case.scene),
             scene_file=f"{loaded.file.parent.name}/{loaded.file.name}",
+            scene_path=_from_here(loaded.file),
+            platform=PLATFORM,
             quality=quality,
             snellcheck_version=__version__,
             started=started,
@@ -93,6 +113,26 @@ class Archive:
         record.write(written, self.root / "records" / f"{name}.json")
         return written
 
+    def discard(self, name: str) -> None:
+        """Removes what an earlier run left of a case, its record first: no record, no case."""
+        (self.root / "records" / f"{name}.json").unlink(missing_ok=True)
+        for path in self.files(name):
+            (self.root / path).unlink(missing_ok=True)
+
+    def sweep(self) -> None:
+        """Removes files that a run was writing when it was killed."""
+        for folder in ("assets", "cases", "data", "images", "records", "scenes"):
+            for path in (self.root / folder).rglob(".*"):
+                if PARTIAL.fullmatch(path.name) and path.is_file():
+                    path.unlink(missing_ok=True)
+
+    def files(self, name: str) -> list[str]:
+        """The paths of all that belongs to a case, its record last, relative to the folder."""
+        found = [*self.root.glob(f"*/{name}.*"), *self.root.glob(f"*/{name}/**/*")]
+        paths = [path.relative_to(self.root).as_posix() for path in found if path.is_file()]
+        mine = [path for path in paths if belongs(path, name)]
+        return sorted(mine, key=lambda path: (path.startswith("records/"), path))
+
     def _run(
         self,
         case: PreparedCase,
@@ -106,7 +146,9 @@ class Archive:
         mine = {role: r for (who, role), r in results.by_role.items() if who == contender.name}
         errors = [r for r in mine.values() if isinstance(r, RendererError)]
         status, reason = Verdict.PASS, contender.reason
-        if contender.absent is not None:
+        if contender.stored is not None:
+            status = worst([c.status for c in judgement.checks if c.renderer == contender.name])
+        elif contender.absent is not None:
             status = contender.absent
         elif errors:
             failed = any(isinstance(e, RendererFailed) for e in errors)
@@ -127,6 +169,9 @@ class Archive:
             log_tail="\n".join(logs[0].splitlines()[-LOG_LINES:]) if logs else "",
             settings=dataclasses.asdict(settings),
             images=self._images(case, contender.name, name, mine),
+            capabilities=sorted(contender.capabilities),
+            facts=contender.preflight.facts() if contender.preflight else {},
+            stored=contender.stored,
         )
 
     def _images(
@@ -143,6 +188,7 @@ class Archive:
             write_thumbnail(shown, self.root / f"{stem}-small.webp")
             pixels = np.ascontiguousarray(shown, np.dtype("<f4"))
             height, width = pixels.shape[:2]
+            mean, mean_error = _means(pixels, mine.get(plan.SECOND_IMAGE), role)
             files.append(
                 ImageFile(
                     role=role,
@@ -152,6 +198,8 @@ class Archive:
                     sha256=hashlib.sha256(pixels.tobytes()).hexdigest(),
                     width=width,
                     height=height,
+                    mean=mean,
+                    mean_error=mean_error,
                 )
             )
         return files
@@ -176,6 +224,30 @@ class Archive:
             write_difference(pictures[a], pictures[b], limit, self.root / path)
             maps.append(DifferenceMap(a=a, b=b, path=path, limit=limit, unit="radiance"))
         return maps
+
+
+def _means(pixels: Pixels, second: object, role: str) -> tuple[list[float], list[float]]:
+    """The mean of each channel, and where there is a picture of a second seed its standard error.
+
+    The difference of the two has twice the variance of one; with N pixels of independent noise the
+    mean of one has the standard error sqrt(mean square of the difference / 2 / N).
+    """
+    if role != plan.IMAGE:  # views of probes show as not finite what was not measured
+        return [], []
+    mean = pixels.mean(axis=(0, 1), dtype=np.float64)
+    if not isinstance(second, Image) or second.pixels.shape != pixels.shape:
+        return mean.tolist(), []
+    difference = pixels.astype(np.float64) - second.pixels
+    count = difference.shape[0] * difference.shape[1]
+    error = np.sqrt((difference**2).mean(axis=(0, 1)) / 2 / count)
+    return mean.tolist(), error.tolist()
+
+
+def _from_here(file: Path) -> str:
+    """The path from the working folder where it is below that; with forward slashes."""
+    path = file.absolute()
+    here = Path.cwd()
+    return (path.relative_to(here) if path.is_relative_to(here) else path).as_posix()
 
 
 def _shown(case: PreparedCase, mine: Mapping[str, object]) -> Iterator[tuple[str, Pixels]]:

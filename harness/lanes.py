@@ -7,72 +7,105 @@ put on one queue, so that whoever listens needs no locks.
 
 from __future__ import annotations
 
+import errno
+import os
 import queue
+import shutil
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
+from harness.cache.cache import Cache
 from harness.camera import primary_rays
 from harness.errors import RendererError, RendererFailed, RendererMissing
+from harness.memo import Memo, memo_of
 from harness.plan import Job
 from harness.preflight import preflight
 from harness.record import Verdict
-from harness.renderers.base import Image, RayTracingRenderer, Renderer, RenderSettings
+from harness.renderers.base import RayTracingRenderer, Renderer, RenderSettings
+from harness.renderers.process_tree import Running, belong_to
 from harness.results import Contender, Result
+
+# With less room than this in the temporary folder, a failure to write is the disk's.
+SPARE_BYTES = 16 * 2**20
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """A renderer is ready, or out with the reason; `remedy` is the command that mends it."""
+    """A renderer is ready, or out with the reason; `remedy` is the command that mends it.
+
+    `memo` is what is known of its work; it is `reused` where its calibration was part of that.
+    """
 
     contender: Contender
+    memo: Memo
+    reused: bool = False
     remedy: str = ""
 
 
 @dataclass(frozen=True)
 class Done:
-    """A job's result after `seconds` of wall time."""
+    """A job's result after `seconds` of wall time, spent in an earlier run where it is `reused`."""
 
     case: int
     job: Job
     result: Result
     seconds: float
+    reused: bool = False
 
 
-Event = Calibrated | Done
+@dataclass(frozen=True)
+class Halted:
+    """Nothing can go on, for a reason that is no renderer's fault: the disk is full."""
+
+    error: OSError
+
+
+Event = Calibrated | Done | Halted
 # What a renderer of someone else's may raise. Each must end as an event, or the run would wait for
 # it for ever; SystemExit is no Exception.
 ANYTHING = (Exception, SystemExit)
-MakeExecutor = Callable[[int], Executor]
+MakeExecutor = Callable[[int, Running], Executor]
 
 
-def threads(count: int) -> Executor:
+def threads(count: int, running: Running) -> Executor:
     """The executor of a lane: jobs wait for child processes, so threads do."""
-    return ThreadPoolExecutor(max_workers=count)
+    return ThreadPoolExecutor(max_workers=count, initializer=belong_to, initargs=(running,))
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What all lanes of a run share: where they report, what is known, what has been started."""
+
+    events: queue.SimpleQueue[Event]
+    lasting: Cache | None
+    passing: Cache
+    running: Running
+    make_executor: MakeExecutor = threads
 
 
 class Lane:
     """One renderer and the executor that runs its jobs."""
 
     def __init__(
-        self,
-        renderer: Renderer,
-        settings: RenderSettings,
-        events: queue.SimpleQueue[Event],
-        make_executor: MakeExecutor = threads,
+        self, renderer: Renderer, settings: RenderSettings, surroundings: Surroundings
     ) -> None:
-        self.renderer, self.settings, self.events = renderer, settings, events
-        self.executor = make_executor(getattr(renderer, "concurrency", 1))
+        self.renderer, self.settings, self.around = renderer, settings, surroundings
+        count = getattr(renderer, "concurrency", 1)
+        self.executor = surroundings.make_executor(count, surroundings.running)
+        self._memo = Memo(renderer.name, "", None, lasting=False)
 
     def start(self) -> None:
         """Calibrates the renderer; a `Calibrated` event follows."""
-        self.executor.submit(self._calibrate)
+        self.executor.submit(self._reporting, self._calibrate)
 
     def submit(self, case: int, jobs: Sequence[Job]) -> None:
         """Runs jobs; a `Done` event follows for each."""
         for job in jobs:
-            self.executor.submit(self._perform, case, job)
+            self.executor.submit(self._reporting, partial(self._perform, case, job))
 
     def close(self) -> None:
         """Drops what has not started and ends the renderer's process."""
@@ -81,7 +114,16 @@ class Lane:
         if close is not None:
             close()
 
-    def _calibrate(self) -> None:
+    def _reporting(self, work: Callable[[], Event]) -> None:
+        try:
+            self.around.events.put(work())
+        except OSError as error:
+            self.around.events.put(Halted(error))
+
+    def _calibrate(self) -> Calibrated:
+        self._memo = memo_of(self.renderer, self.around.lasting, self.around.passing)
+        if (known := self._memo.calibration(self.settings)) is not None:
+            return Calibrated(known, self._memo, reused=True)
         remedy = ""
         try:
             contender = calibrate(self.renderer, self.settings)
@@ -90,16 +132,31 @@ class Lane:
         except ANYTHING as error:
             reason = f"failed: {_described(error)}"
             contender = _out(self.renderer.name, Verdict.ERROR, reason)
-        self.events.put(Calibrated(contender, remedy))
+        self._memo.keep_calibration(self.settings, contender)
+        return Calibrated(contender, self._memo, remedy=remedy)
 
-    def _perform(self, case: int, job: Job) -> None:
+    def _perform(self, case: int, job: Job) -> Done:
+        if (known := self._memo.result(job)) is not None:
+            return Done(case, job, known.result, known.seconds, reused=True)
         start = time.perf_counter()
         result = perform(self.renderer, job)
-        self.events.put(Done(case, job, result, time.perf_counter() - start))
+        seconds = time.perf_counter() - start
+        self._memo.keep(job, result, seconds)
+        return Done(case, job, result, seconds)
 
 
 def perform(renderer: Renderer, job: Job) -> Result:
-    """Does one job; whatever goes wrong is the result, so one failure costs one result."""
+    """Does one job; whatever goes wrong is the result, so one failure costs one result.
+
+    Raises OSError where the disk is full: then every other result would be lost as well.
+    """
+    result = _performed(renderer, job)
+    if isinstance(result, RendererFailed):
+        _blame_the_disk(result)
+    return result
+
+
+def _performed(renderer: Renderer, job: Job) -> Result:
     try:
         if job.path is None:
             start = time.perf_counter()
@@ -112,6 +169,15 @@ def perform(renderer: Renderer, job: Job) -> Result:
         return error
     except ANYTHING as error:
         return RendererFailed(_described(error))
+
+
+def _blame_the_disk(failure: RendererFailed) -> None:
+    """Raises OSError where a renderer failed because there was no room for its files."""
+    why = os.strerror(errno.ENOSPC)
+    folder = tempfile.gettempdir()
+    told = f"{failure} {failure.log}"
+    if why in told and shutil.disk_usage(folder).free < SPARE_BYTES:
+        raise OSError(errno.ENOSPC, why, folder)
 
 
 def calibrate(renderer: Renderer, settings: RenderSettings) -> Contender:
@@ -146,8 +212,3 @@ def _described(error: BaseException) -> str:
 def _tail(error: RendererError) -> str:
     lines = error.log.strip().splitlines()
     return f" ({lines[-1]})" if lines else ""
-
-
-def picture_of(result: Result) -> Image | None:
-    """The result where it is an image."""
-    return result if isinstance(result, Image) else None

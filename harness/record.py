@@ -6,43 +6,26 @@ read nothing else.
 
 from __future__ import annotations
 
-import enum
-import os
-import tempfile
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
-from harness.errors import InputError
-
-Document = TypeVar("Document", bound="BaseModel")
+from harness.documents import Model, read
+from harness.documents import write_bytes as write_bytes  # for those who write beside records
+from harness.documents import write_text as write_text
+from harness.outcomes import SEVERITY as SEVERITY
+from harness.outcomes import AgainstBaseline as AgainstBaseline
+from harness.outcomes import BaselineState as BaselineState
+from harness.outcomes import BaselineSummary as BaselineSummary
+from harness.outcomes import LostCheck as LostCheck
+from harness.outcomes import Stored as Stored
+from harness.outcomes import Trend as Trend
+from harness.outcomes import Verdict as Verdict
+from harness.outcomes import worst as worst
 
 RECORD_SCHEMA: Literal["snellcheck-record/1"] = "snellcheck-record/1"
 SUMMARY_SCHEMA: Literal["snellcheck-summary/1"] = "snellcheck-summary/1"
-
-
-class Verdict(enum.StrEnum):
-    """PASS and KNOWN are green; KNOWN is a deviation of the size that the scene documents."""
-
-    PASS = "pass"
-    FAIL = "fail"
-    SKIP = "skip"
-    ERROR = "error"
-    KNOWN = "known"
-
-
-# The order in which verdicts of parts decide the verdict of the whole, worst first.
-SEVERITY = (Verdict.ERROR, Verdict.FAIL, Verdict.SKIP, Verdict.KNOWN, Verdict.PASS)
-
-
-def worst(verdicts: list[Verdict]) -> Verdict:
-    """The verdict of a whole; nothing at all is an ERROR, because it shows nothing."""
-    return min(verdicts, key=SEVERITY.index, default=Verdict.ERROR)
-
-
-class Model(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="strings")
 
 
 class Attribution(Model):
@@ -78,6 +61,8 @@ class Check(Model):
     reason: str
     derivation: str = ""
     detail: dict[str, float | int | str] = Field(default_factory=dict)
+    stored: list[str] = Field(default_factory=list)  # renderers whose side was not rendered now
+    baseline: AgainstBaseline | None = None
     attribution: Attribution | None = None
 
 
@@ -136,7 +121,8 @@ class ImageFile(Model):
     """A stored image; all paths are relative to the run's folder. `role` is "image", "probe", …
 
     `path` is the linear data (EXR); `picture` is the same at full size as a browser can show it,
-    `thumbnail` a smaller one.
+    `thumbnail` a smaller one. `mean` is of each channel over the picture; `mean_error` is its
+    standard error where the renderer samples.
     """
 
     role: str
@@ -146,6 +132,8 @@ class ImageFile(Model):
     sha256: str
     width: int
     height: int
+    mean: list[float] = Field(default_factory=list)
+    mean_error: list[float] = Field(default_factory=list)
 
 
 class DifferenceMap(Model):
@@ -172,6 +160,9 @@ class RendererRun(Model):
     settings: dict[str, float | int | str] = Field(default_factory=dict)
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: emitted scene …
     images: list[ImageFile] = Field(default_factory=list)
+    capabilities: list[str] = Field(default_factory=list)
+    facts: dict[str, float | int | str] = Field(default_factory=dict)  # of its preflight
+    stored: Stored | None = None
 
 
 class Series(Model):
@@ -234,7 +225,10 @@ class CaseRecord(Model):
     formula: str = ""
     parameters: dict[str, float | int | str] = Field(default_factory=dict)
     scene_sha256: str
+    scene_fingerprint: str = ""  # the same on all machines: see harness.scene.fingerprint
     scene_file: str
+    scene_path: str = ""  # as it was found, from the working folder where it is below it
+    platform: str = ""
     quality: str
     snellcheck_version: str
     started: str  # ISO 8601, UTC
@@ -256,7 +250,7 @@ class CaseRecord(Model):
 
 class RendererSummary(Model):
     version: str
-    status: str  # "ok", "missing", "failed preflight", "failed"
+    status: str  # "ok", "stored" in place of a missing one, "missing", "failed preflight", "failed"
     cases: int
     render_s: float
     reason: str = ""
@@ -272,6 +266,19 @@ class Counts(Model):
     skip: int = 0
     error: int = 0
     known: int = 0
+
+
+class Effort(Model):
+    """What the jobs of a run cost: results `rendered` anew and `reused` from earlier.
+
+    `retried` counts repetitions after failures that were not the renderer's (a lost machine, a
+    process that could not be started), `damaged` entries of the cache that were made again.
+    """
+
+    rendered: int = 0
+    reused: int = 0
+    retried: int = 0
+    damaged: int = 0
 
 
 class SummaryCase(Model):
@@ -295,30 +302,14 @@ class Summary(Model):
     renderers: dict[str, RendererSummary]
     counts: Counts
     cases: list[SummaryCase]
+    baseline: BaselineSummary | None = None
     diagnoses: list[Diagnosis] = Field(default_factory=list)  # one per renderer that is off
+    effort: Effort = Effort()
+    interrupted: bool = False  # then cases that were not judged yet are ERROR and have no record
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"
     )
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Writes all of `data` or nothing: to a temporary name beside `path`, then renamed."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(name).chmod(0o644)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes `text` as UTF-8, all of it or nothing."""
-    write_bytes(path, text.encode("utf-8"))
 
 
 def write(document: CaseRecord | Summary, path: Path) -> None:
@@ -326,22 +317,11 @@ def write(document: CaseRecord | Summary, path: Path) -> None:
     write_text(path, document.model_dump_json(by_alias=True, indent=1) + "\n")
 
 
-def _read(path: Path, kind: type[Document]) -> Document:
-    try:
-        return kind.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise InputError.of(f"cannot be read: {error.strerror}", file=path) from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise InputError.of(f"not a valid record: {first['msg']}", file=path, key=key) from error
-
-
 def read_case(path: Path) -> CaseRecord:
     """Raises InputError where `path` is unreadable or not a record of this version."""
-    return _read(path, CaseRecord)
+    return read(path, CaseRecord)
 
 
 def read_summary(path: Path) -> Summary:
     """Raises InputError where `path` is unreadable or not a summary of this version."""
-    return _read(path, Summary)
+    return read(path, Summary)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from harness.errors import RendererError, RendererFailed
 from harness.measure.images import Pixels
 from harness.measure.precision import Precision
 from harness.preflight import FLOAT32, FLOAT64, Preflight
-from harness.record import Verdict
+from harness.record import Check, Stored, Verdict
 from harness.renderers.base import Capability, Image, RayPaths
 from harness.scene.resolved import Mesh, ResolvedScene
 
@@ -26,7 +26,10 @@ class NotAvailable(Exception):
 
 @dataclass(frozen=True)
 class Contender:
-    """A renderer as the judge sees it. `absent` is SKIP or ERROR with `reason` where it is out."""
+    """A renderer as the judge sees it. `absent` is SKIP or ERROR with `reason` where it is out.
+
+    `stored` says that approved results, `stored_checks` by id, stand in for a missing one.
+    """
 
     name: str
     version: str
@@ -34,6 +37,8 @@ class Contender:
     preflight: Preflight | None
     absent: Verdict | None = None
     reason: str = ""
+    stored: Stored | None = None
+    stored_checks: Mapping[str, Check] = field(default_factory=dict)
 
     def ready(self) -> Preflight:
         """Its calibration. Raises NotAvailable where it is out."""

@@ -58,7 +58,8 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
     table = Table(title="Verdicts: checks passed of checks made", title_justify="left")
     table.add_column("family")
     for name in names:
-        table.add_column(name, justify="right")
+        stored = " (stored)" if summary.renderers[name].status == "stored" else ""
+        table.add_column(escape(name + stored), justify="right")
     by_family: dict[str, list[Check]] = {}
     for case in summary.cases:
         by_family.setdefault(case.family, []).extend(case.checks)
@@ -75,10 +76,34 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
     _problems(summary, console)
     for diagnosis in summary.diagnoses:
         console.print(f"[bold]Diagnosis[/] {escape(diagnosis.sentence)}")
+    _effort(summary, console)
     counts = Counter(c.status for case in summary.cases for c in case.checks)
     said = ", ".join(f"[{STYLE[v]}]{counts[v]} {v.value}[/]" for v in Verdict)
     console.print(f"{sum(counts.values())} checks in {summary.wall_s:.1f} s: {said}")
     console.print(f"Report: {escape(str(index))}", soft_wrap=True)
+
+
+def _effort(summary: Summary, console: Console) -> None:
+    """What was done anew and what was not; and that a run is not whole, where it is not."""
+    effort = summary.effort
+    parts = [f"{effort.rendered} results rendered", f"{effort.reused} reused"]
+    if effort.retried:
+        parts.append(f"{effort.retried} tried again")
+    if effort.damaged:
+        parts.append(f"{effort.damaged} damaged entries of the cache made again")
+    console.print(", ".join(parts))
+    if summary.interrupted:
+        console.print("[bold]Interrupted:[/] the same command goes on where this run stood.")
+
+
+def size(count: int) -> str:
+    """Bytes for people: 1.3 GiB."""
+    value = float(count)
+    for unit in ("bytes", "KiB", "MiB"):
+        if value < 1024:
+            return f"{value:.3g} {unit}"
+        value /= 1024
+    return f"{value:.3g} GiB"
 
 
 def _cell(checks: list[Check]) -> str:

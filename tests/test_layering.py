@@ -22,12 +22,16 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores"),
-    ("record", "imagefile", "expected", "law", "measure.observables"),
+    ("errors", "data", "cores", "fingerprint", "documents", "outcomes"),
+    ("record", "imagefile", "expected", "expected_systems", "law", "measure.observables"),
+    ("cache",),
     ("scene",),
     ("renderers.base",),
+    ("intervals",),
+    ("lens_chord",),
     ("camera", "chord", "section", "translate"),
     ("truth",),
+    ("tree",),
     ("renderers",),
     ("probe",),
     ("measure",),
@@ -35,7 +39,8 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight", "attribution"),
     ("report",),
-    ("plan", "results", "pairs", "explain", "judge", "packing", "archive", "lanes", "run"),
+    ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
+    ("parcel", "memo", "bundle", "lanes", "session", "run"),
     ("doctor",),
     ("show", "cli"),
 )

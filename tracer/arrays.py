@@ -10,13 +10,16 @@ from numpy.typing import NDArray
 
 from tracer.errors import SceneError
 from tracer.mesh import LEFT, RIGHT, WORDS, Mesh, Tree, grow_tree, require_closed
-from tracer.patterns import Constant, Picture, pattern_row
+from tracer.patterns import Constant, Pattern, Picture, pattern_row
 from tracer.scene import (
     Diffuse,
+    DirectionalLight,
     Emissive,
     Material,
     Medium,
     Mirror,
+    Phong,
+    PointLight,
     Scene,
     Shape,
     Solid,
@@ -34,6 +37,7 @@ Floats = NDArray[np.float64]
 # Kinds of shapes, and of what they bound.
 SPHERE, CELL, COMPOUND, MESH, RECTANGLE, DISK = range(6)
 DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
+POINT, DIRECTIONAL = 0.0, 1.0
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
 # MEDIUM and EXTERIOR are what a thin slab is made of and what is around it. In a solid, the k-th of
@@ -50,14 +54,14 @@ class Arrays(NamedTuple):
 
     objects: NDArray[np.int64]  # (n, 8)
     balls: Floats  # (n, 4): centre and squared radius of a sphere around it
-    materials: Floats  # (n, 7): two colours and a thickness
+    materials: Floats  # (n, 9): two colours, thickness, highlight and its exponent
     rows: Floats  # shapes
-    media: Floats  # (m, 4): ior, absorption
+    media: Floats  # (m, 5): ior, absorption, 1 where it disperses
     solids: int
     patterns: Floats
     texels: Floats
-    lights: Floats  # (l, 6): position, intensity
-    background: Floats  # (1, 3)
+    lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
+    background: Floats  # (1, 9): a pattern's row
     nodes: NDArray[np.float32]  # of all meshes' trees
     links: NDArray[np.int32]  # the same memory
     triangles: Floats
@@ -72,11 +76,12 @@ class _Flattener:
         self.balls: list[list[float]] = []
         self.materials: list[list[float]] = []
         self.rows: list[list[float]] = []
-        self.media: list[Medium] = []
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
         self.trees: list[Tree] = []
-        self.nodes = self.triangles = self.normals = self.texel_count = self.surface_count = 0
+        self.nodes = self.triangles = self.normals = self.texel_count = 0
+        self.surface_count = 0
+        self.medium_count = 1  # in the order of `media_of`
 
     def solids(self, solids: list[Solid]) -> None:
         """Solids in the order of their rank."""
@@ -87,8 +92,8 @@ class _Flattener:
         ]
         times = Counter(abs(number) for bounds in found for _, number in bounds)
         self.surface_count = surfaces.count
+        self.medium_count += len(solids)
         for k, (solid, bounds) in enumerate(zip(solids, found, strict=True)):
-            self.media.append(solid.medium)
             shape = solid.shape
             if isinstance(shape, Mesh):
                 require_closed(shape, solid.name)
@@ -96,10 +101,6 @@ class _Flattener:
                 # As other solids meet that surface, to the last bit.
                 shape = Cell((bounds[0][0],), shape.center, shape.radius)
             self._object(shape, DIELECTRIC, (1 + k, AMBIENT), -1, [0.0] * 7, bounds)
-
-    def medium(self, medium: Medium) -> int:
-        self.media.append(medium)
-        return len(self.media) - 1
 
     def surface(self, surface: Surface) -> None:
         kind, media, pattern, row = self._material(surface)
@@ -120,24 +121,31 @@ class _Flattener:
                         f"{surface.name}: only rectangles and disks can show a pattern, "
                         f"a {type(surface.shape).__name__} emits a constant radiance"
                     )
-                self.patterns.append(pattern_row(pattern, self.texel_count))
-                if isinstance(pattern, Picture):
-                    self.texels.append(pattern.pixels.reshape(-1, 3))
-                    self.texel_count += len(self.texels[-1])
+                self.patterns.append(self.pattern(pattern))
                 return EMISSIVE, (0, 0), len(self.patterns) - 1, [0.0] * 7
             case Diffuse(reflectance):
                 return DIFFUSE, (0, 0), -1, [*reflectance, *none, 0.0]
+            case Phong(reflectance, specular, exponent):
+                return DIFFUSE, (0, 0), -1, [*reflectance, *none, 0.0, specular, exponent]
             case Mirror(reflectance):
                 return MIRROR, (0, 0), -1, [*reflectance, *none, 0.0]
             case Translucent(color, filtered, clear):
                 passes = [filtered * c + clear for c in color]
                 stays = [(1.0 - filtered - clear) * c for c in color]
                 return TRANSLUCENT, (0, 0), -1, [*passes, *stays, 0.0]
-            case ThinSlab(medium, thickness, exterior):
+            case ThinSlab(thickness=thickness):
                 if not isinstance(surface.shape, Rectangle | Disk):
                     raise SceneError(f"{surface.name}: a thin slab must be a rectangle or a disk")
-                media = self.medium(medium), self.medium(exterior)
+                media = self.medium_count, self.medium_count + 1
+                self.medium_count += 2
                 return THIN_SLAB, media, -1, [*none, *none, thickness]
+
+    def pattern(self, pattern: Pattern) -> list[float]:
+        row = pattern_row(pattern, self.texel_count)
+        if isinstance(pattern, Picture):
+            self.texels.append(pattern.pixels.reshape(-1, 3))
+            self.texel_count += len(self.texels[-1])
+        return row
 
     def _object(
         self,
@@ -214,6 +222,30 @@ def _size(shape: SolidShape) -> float:
     return shape.radius
 
 
+def media_of(scene: Scene) -> list[Medium]:
+    """The media of a scene: around everything, in its solids, in and around its thin slabs."""
+    found = [scene.ambient, *(solid.medium for solid in ranked(scene.solids))]
+    for surface in scene.surfaces:
+        if isinstance(surface.material, ThinSlab):
+            found += [surface.material.medium, surface.material.exterior]
+    return found
+
+
+def media_table(media: list[Medium], wavelength: float) -> Floats:
+    """The one table of `Arrays` that depends on the wavelength."""
+    rows = [
+        [m.index(wavelength), *m.absorption, float(not isinstance(m.ior, float | int))]
+        for m in media
+    ]
+    return _table(rows, 5)
+
+
+def _light(light: PointLight | DirectionalLight) -> list[float]:
+    if isinstance(light, PointLight):
+        return [*light.position, *light.intensity, POINT]
+    return [*(-x for x in light.direction), *light.irradiance, DIRECTIONAL]
+
+
 def _table(rows: list[list[float]], columns: int) -> Floats:
     table = np.zeros((len(rows), columns))
     for k, row in enumerate(rows):
@@ -239,24 +271,26 @@ def flatten(scene: Scene) -> Arrays:
 
 
 def _flatten(scene: Scene) -> Arrays:
+    media = media_of(scene)
     into = _Flattener()
-    into.medium(scene.ambient)
     into.solids(ranked(scene.solids))
     for surface in scene.surfaces:
         into.surface(surface)
+    around = scene.background
+    background = into.pattern(around if isinstance(around, Picture) else Constant(around))
     trees = into.trees or [_NO_TREE]
     nodes = np.concatenate([tree.nodes for tree in trees])
     return Arrays(
         objects=np.array(into.objects, np.int64).reshape(-1, 8),
         balls=_table(into.balls, 4),
-        materials=_table(into.materials, 7),
+        materials=_table(into.materials, 9),
         rows=_table(into.rows, COLUMNS),
-        media=_table([[m.ior, *m.absorption] for m in into.media], 4),
+        media=media_table(media, scene.wavelength),
         solids=len(scene.solids),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
-        lights=_table([[*light.position, *light.intensity] for light in scene.lights], 6),
-        background=_table([list(scene.background)], 3),
+        lights=_table([_light(light) for light in scene.lights], 7),
+        background=_table([background], 9),
         nodes=nodes,
         links=nodes.view(np.int32),
         triangles=np.concatenate([tree.triangles for tree in trees]),

@@ -37,6 +37,11 @@ config_option = click.option(
     help="A snellcheck-renderer.toml that describes a renderer of your own.",
 )  # fmt: skip
 
+cache_option = click.option(
+    "--cache", "cache_at", metavar="DIR|URL", default="", envvar="SNELLCHECK_RESULTS",
+    help="Where results are kept from run to run.  [default: the user's cache folder]",
+)  # fmt: skip
+
 
 def loaded_cases(
     selection: Sequence[str],

@@ -9,13 +9,14 @@ import shlex
 import shutil
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from harness.cores import core_count
 from harness.errors import InputError, RendererError, RendererFailed, RendererMissing, nearest
+from harness.fingerprint import code_digest, combined, file_digest
 from harness.imagefile import Encoding
 from harness.renderers.base import Capability, Health, Image, RenderSettings
 from harness.renderers.delivery import delivered, described
@@ -103,7 +104,8 @@ class CommandRenderer:
 
     `encoding` is what integer values in an image mean, where the file itself does not say.
     Without a declared `version` it is the hash of the files that the command names, so that a
-    changed program is another version.
+    changed program is another version. `depends` are globs of all files that decide its images;
+    only where they are given are images kept from run to run.
     """
 
     # A small renderer uses one core.
@@ -119,7 +121,9 @@ class CommandRenderer:
         encoding: Encoding | None = None,
         capabilities: frozenset[Capability] = USUAL_CLAIMS,
         version: str = "",
+        depends: tuple[str, ...] = (),
     ) -> None:
+        self._depends = depends
         self._name = name
         self._template = template
         self._folder = folder
@@ -140,6 +144,10 @@ class CommandRenderer:
         """Raises RendererMissing where the executable cannot be found."""
         found = program_version(self._template.constants(), self._folder)
         return self._version or found
+
+    def fingerprint(self) -> str | None:
+        """The content of the program and of all that it `depends` on, as far as that was told."""
+        return command_fingerprint(self._template.constants(), self._folder, self._depends)
 
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """Raises RendererMissing, RendererUnsupported or RendererFailed."""
@@ -194,6 +202,22 @@ class CommandRenderer:
         path = folder / "scene.json"
         path.write_text(scene.model_dump_json(), encoding="utf-8")
         return path
+
+
+def command_fingerprint(words: list[str], folder: Path, depends: Sequence[str]) -> str | None:
+    """The content of what a command runs and of the files in `folder` that `depends` selects.
+
+    None where nothing was said of what the command depends on, or where it does not exist.
+    """
+    if not depends:
+        return None
+    try:
+        program = program_version(words, folder)
+    except RendererMissing:
+        return None
+    files = sorted({path for glob in depends for path in folder.glob(glob) if path.is_file()})
+    contents = [f"{path.relative_to(folder)} {file_digest(path)}" for path in files]
+    return combined(code_digest(__name__), program, *words, *contents)
 
 
 def program_version(words: list[str], folder: Path) -> str:

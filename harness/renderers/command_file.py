@@ -16,6 +16,7 @@ from harness.renderers.command import (
     CommandRenderer,
     ImageFormat,
     Template,
+    command_fingerprint,
 )
 from harness.renderers.persistent import Program, WorkerRenderer
 from harness.scene.document import parse_document, read_source
@@ -40,6 +41,7 @@ class RendererTable(BaseModel):
     capabilities: list[Annotated[Capability, Field(strict=False)]] | None = None
     persistent: bool = False
     version: str = ""
+    depends: list[str] = []
 
 
 def renderer_from_file(path: Path) -> Renderer:
@@ -92,10 +94,14 @@ def _renderer(table: RendererTable, folder: Path) -> Renderer:
             encoding=table.encoding,
             capabilities=USUAL_CLAIMS if claims is None else claims,
             version=table.version,
+            depends=tuple(table.depends),
         )
     template = Template.parse(table.command, needs=(), known=("python",))
     program = Program(tuple(template.fill({})), folder, table.format, table.encoding)
-    return WorkerRenderer(table.name, program, capabilities=claims)
+    return WorkerRenderer(
+        table.name, program, capabilities=claims,
+        fingerprint=lambda: command_fingerprint(list(program.argv), folder, table.depends),
+    )  # fmt: skip
 
 
 def _finding(details: Any) -> Finding:

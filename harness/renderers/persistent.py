@@ -59,7 +59,8 @@ class WorkerRenderer:
     `engine` is "module:Class" (see `worker`) or any `Program`. `capabilities` default to those
     that the worker tells, so asking for them may start it; one that does not start has none, and
     `version` and `render` say why. `env` is added to the environment; a function is called at
-    each start. `remedy` is the command that installs a missing engine.
+    each start. `remedy` is the command that installs a missing engine. `fingerprint` is as in
+    `harness.renderers.base.Renderer`.
 
     Threads may share one renderer, and wait for each other. After a fork, the child process has
     a worker of its own.
@@ -73,7 +74,9 @@ class WorkerRenderer:
         capabilities: frozenset[Capability] | None = None,
         env: Environment = None,
         remedy: str = "",
+        fingerprint: Callable[[], str | None] = lambda: None,
     ) -> None:
+        self.fingerprint = fingerprint
         self._name = name
         self._program = engine_program(engine) if isinstance(engine, str) else engine
         self._declared = capabilities

@@ -23,6 +23,7 @@ from harness.errors import (
     RendererMissing,
     RendererUnsupported,
 )
+from harness.fingerprint import code_digest, combined, file_digest, versions
 from harness.renderers.base import Capability, Health, Image, RenderSettings
 from harness.renderers.delivery import delivered
 from harness.renderers.needs import require
@@ -101,6 +102,14 @@ class PovRayRenderer:
                 raise RendererMissing(f"{found[0]} is too old: POV-Ray 3.7 is needed; {INSTALL}")
             self._version = found[0].removeprefix("POV-Ray ")
         return self._version
+
+    def fingerprint(self) -> str | None:
+        """The executable's content and our adapter's code. Not the libraries that it loads."""
+        found = shutil.which(self._executable)
+        if found is None:
+            return None
+        code = code_digest(__name__)
+        return combined(file_digest(Path(found)), code, versions("numpy", "netpbmfile"))
 
     def render(self, scene: rs.ResolvedScene, settings: RenderSettings) -> Image:
         require(scene, self.name, self.capabilities)

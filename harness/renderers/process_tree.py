@@ -14,8 +14,11 @@ import secrets
 import signal
 import subprocess
 import sys
+import threading
 import time
+import weakref
 from collections.abc import Mapping, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 from typing import IO
 
@@ -28,6 +31,41 @@ TOKEN = "SNELLCHECK_PROCESS"
 Pipe = int | IO[bytes]
 
 
+class Running:
+    """What a run has started. `stop` ends it all, from any thread, and lets nothing begin."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._trees: weakref.WeakSet[ProcessTree] = weakref.WeakSet()
+        self._stopped = False
+
+    def add(self, tree: ProcessTree) -> None:
+        """Raises RendererFailed, and ends `tree`, where the run was stopped."""
+        with self._lock:
+            self._trees.add(tree)
+            stopped = self._stopped
+        if stopped:
+            tree.kill()
+            tree.process.wait()
+            raise RendererFailed("the run was stopped")
+
+    def stop(self) -> None:
+        with self._lock:
+            self._stopped = True
+            trees = list(self._trees)
+        for tree in trees:
+            if not tree.ended:
+                tree.kill()
+
+
+_RUNNING: ContextVar[Running | None] = ContextVar("running", default=None)
+
+
+def belong_to(running: Running) -> None:
+    """What this thread starts from now on belongs to `running`."""
+    _RUNNING.set(running)
+
+
 class ProcessTree:
     """Made by `spawn`. `process` is the root; its standard streams are the caller's."""
 
@@ -37,6 +75,7 @@ class ProcessTree:
         self._before = before  # alive before the root was started, so no members
         self._members = {process.pid: psutil.Process(process.pid)}
         self._strangers: set[int] = set()
+        self.ended = False  # by kill()
 
     def resident_mb(self) -> float:
         """Resident memory of all members in MiB; pages that they share are counted for each."""
@@ -64,6 +103,7 @@ class ProcessTree:
         for pid, member in self._members.items():
             while pid != self.process.pid and _runs(member) and time.monotonic() < deadline:
                 time.sleep(0.002)
+        self.ended = True
 
     def _find_members(self) -> None:
         pids = set(psutil.pids())
@@ -131,7 +171,10 @@ def spawn(
     except (OSError, ValueError) as error:
         raise RendererFailed(f"cannot start {argv[0]!r}: {error}") from error
     _limit(process.pid, output_mb, cpu_s)
-    return ProcessTree(process, token, before)
+    tree = ProcessTree(process, token, before)
+    if (running := _RUNNING.get()) is not None:
+        running.add(tree)
+    return tree
 
 
 def _limit(pid: int, output_mb: int, cpu_s: float | None) -> None:

@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
 from pathlib import Path
 
-from harness.errors import InputError, RendererFailed, nearest
+from harness.errors import InputError, RendererFailed, RendererMissing, nearest
+from harness.fingerprint import code_digest, combined, versions
 from harness.renderers.base import Renderer
 
 GROUP = "snellcheck.renderers"
 Factory = Callable[[], Renderer]
+
+# What stands between the harness and an engine in a worker, beside the engine's own adapter.
+HOSTING = ("harness.camera", "harness.renderers.persistent", "harness.renderers.worker")
 
 INSTALL_MITSUBA = "pip install 'snellcheck[mitsuba]'"
 
@@ -90,7 +94,14 @@ def tracer() -> Renderer:
     """The tracer of this project, in a worker."""
     from harness.renderers.persistent import WorkerRenderer
 
-    return WorkerRenderer("tracer", "harness.renderers.tracer:TracerEngine")
+    return WorkerRenderer(
+        "tracer", "harness.renderers.tracer:TracerEngine", fingerprint=_fingerprint_of_tracer
+    )
+
+
+def _fingerprint_of_tracer() -> str:
+    code = code_digest("harness.renderers.tracer", *HOSTING)
+    return combined(code, versions("numpy", "numba", "llvmlite"))
 
 
 def povray() -> Renderer:
@@ -115,4 +126,25 @@ def _mitsuba(name: str, engine: str) -> Renderer:
     from harness.renderers.persistent import WorkerRenderer
 
     target = f"harness.renderers.mitsuba:{engine}"
-    return WorkerRenderer(name, target, env=child_environment, remedy=INSTALL_MITSUBA)
+    return WorkerRenderer(
+        name, target, env=child_environment, remedy=INSTALL_MITSUBA,
+        fingerprint=_fingerprint_of_mitsuba,
+    )  # fmt: skip
+
+
+def _fingerprint_of_mitsuba() -> str | None:
+    """Our adapter, the files of Mitsuba and Dr.Jit as installed, and the compiler they load."""
+    from harness.renderers.mitsuba_variants import choose
+
+    try:
+        choice = choose()
+        installed = [distribution(name).read_text("RECORD") or "" for name in ("mitsuba", "drjit")]
+    except (RendererMissing, PackageNotFoundError):
+        return None
+    compiler = ""
+    if choice.library is not None:
+        about = choice.library.path.stat()
+        compiler = f"{choice.library.path} {about.st_size} {about.st_mtime_ns}"
+    code = code_digest("harness.renderers.mitsuba", *HOSTING)
+    told = versions("numpy", "mitsuba", "drjit")
+    return combined(code, told, choice.variant, compiler, *installed)

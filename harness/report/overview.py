@@ -17,6 +17,7 @@ EXIT_CODES = {
     1: "a check failed",
     2: "bad usage or bad input",
     3: "something asked for could not run",
+    130: "interrupted",
 }
 
 
@@ -58,6 +59,40 @@ def headline(summary: Summary) -> Headline:
         _, case_id, view = min(good, key=lambda item: item[0])
         return Headline(state, text, also, "Closest to its limit:", view, case_id)
     return Headline(state, text, also)
+
+
+MOST_FAILURES = 6
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A check that fails, where it stands and how many more of its renderer and kind there are."""
+
+    case: str
+    view: CheckView
+    more: int
+
+
+def failures(summary: Summary) -> tuple[list[Failure], int]:
+    """The worst check of each renderer and observable that fails, and how many kinds are left out.
+
+    One fault of a renderer fails many checks; each kind of failure is listed once.
+    """
+    kinds: dict[tuple[str, str], list[tuple[tuple[int, float], str, CheckView]]] = {}
+    for case in summary.cases:
+        for check in case.checks:
+            if check.status in (Verdict.FAIL, Verdict.ERROR):
+                view = check_view(check)
+                order = (int(check.status != Verdict.FAIL), view.rank[1])
+                kinds.setdefault((check.renderer, check.observable), []).append(
+                    (order, case.id, view)
+                )
+    worst = sorted(
+        ((min(found, key=lambda f: f[0]), len(found) - 1) for found in kinds.values()),
+        key=lambda item: item[0][0],
+    )
+    shown = [Failure(clean(case), view, more) for (_, case, view), more in worst[:MOST_FAILURES]]
+    return shown, max(0, len(worst) - MOST_FAILURES)
 
 
 def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:

@@ -219,9 +219,9 @@ def _select(
     if not suite.cases and not suite.broken:
         problems.append(Problem("holds no scene files (*.toml)", file=root))
     for glob in globs or ["*"]:
-        pattern = _pattern(glob)
-        chosen = [c for c in suite.cases if _matches(pattern, c) or glob in c.model.tags]
-        broken = [path for path in suite.broken if _may_match(pattern, glob, path)]
+        wanted = pattern(glob)
+        chosen = [c for c in suite.cases if _matches(wanted, c) or glob in c.model.tags]
+        broken = [path for path in suite.broken if _may_match(wanted, glob, path)]
         _add(chosen, found, problems)
         for path in broken:
             problems += suite.broken[path].problems
@@ -231,21 +231,22 @@ def _select(
                 problems += error.problems
 
 
-def _pattern(glob: str) -> re.Pattern[str]:
+def pattern(glob: str) -> re.Pattern[str]:
+    """A selection as a regular expression: ``*`` and ``?`` stand for any characters."""
     # Brackets are not wildcards: they belong to ids.
     text = re.escape(glob).replace(r"\*", ".*").replace(r"\?", ".")
     return re.compile(text, re.DOTALL)
 
 
-def _matches(pattern: re.Pattern[str], case: LoadedCase) -> bool:
-    return any(pattern.fullmatch(name) for name in (case.id, case.case, case.model.family))
+def _matches(wanted: re.Pattern[str], case: LoadedCase) -> bool:
+    return any(wanted.fullmatch(name) for name in (case.id, case.case, case.model.family))
 
 
-def _may_match(pattern: re.Pattern[str], glob: str, path: Path) -> bool:
+def _may_match(wanted: re.Pattern[str], glob: str, path: Path) -> bool:
     """Whether a file that could not be loaded might have the case that is asked for."""
     name = case_name(path)
     names = (name, path.absolute().parent.name)
-    return any(map(pattern.fullmatch, names)) or glob.startswith(f"{name}[")
+    return any(map(wanted.fullmatch, names)) or glob.startswith(f"{name}[")
 
 
 def _no_match(glob: str, suite: _Suite) -> Problem:

@@ -10,6 +10,7 @@ import click
 from harness.cli.errors import reports_errors
 from harness.cli.options import (
     DEFAULT_OUT,
+    cache_option,
     chosen_renderers,
     command_option,
     config_option,
@@ -27,9 +28,18 @@ from harness.cli.options import (
 @config_option
 @click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True)
 @click.option("--jobs", type=click.IntRange(1, 256), help="Cores to use.  [default: all]")
+@click.option(
+    "--stored/--no-stored",
+    default=True,
+    show_default=True,
+    help="Let approved results stand in for renderers that are missing.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @quality_option
 @scenes_option
+@cache_option
+@click.option("--no-cache", is_flag=True, help="Neither use nor keep results of other runs.")
+@click.option("--fresh", is_flag=True, help="Begin anew where a run into OUT was interrupted.")
 @reports_errors
 def command(
     case: tuple[str, ...],
@@ -38,30 +48,48 @@ def command(
     configs: tuple[Path, ...],
     out: Path,
     jobs: int | None,
+    stored: bool,
     seed: int,
     quality: str,
     scenes: Path | None,
+    cache_at: str,
+    no_cache: bool,
+    fresh: bool,
 ) -> None:
     """Render CASEs (all of them, or those a glob like "slab-*" selects) and judge them.
 
-    Writes OUT/records/*.json, OUT/summary.json and OUT/index.html.
+    Writes OUT/records/*.json, OUT/summary.json and OUT/index.html. What has not changed since an
+    earlier run is taken from the cache. After an interruption, even by kill -9, the same command
+    goes on where it stood.
     """
+    import shutil
+
     from harness import show
+    from harness.baseline.stand_in import StandIns
+    from harness.cache.cache import open_cache
+    from harness.cli.baselines import stand_in_sources
+    from harness.cli.interrupts import terminable
     from harness.cores import core_count
     from harness.renderers import registry
     from harness.report import write_report
-    from harness.run import HELPER
+    from harness.run import HELPER, UNFINISHED
     from harness.run import run as run_cases
 
     chosen = chosen_renderers(renderers, commands, configs)
     cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
     helper = next((r for r in chosen if r.name == HELPER), None) or registry.create(HELPER)
     line = " ".join(["snellcheck", *sys.argv[1:]])
-    with show.progress() as progress:
+    cache = None if no_cache else open_cache(cache_at)
+    if fresh:
+        shutil.rmtree(out / UNFINISHED, ignore_errors=True)
+    with show.progress() as progress, terminable():
         summary = run_cases(
             cases, chosen, helper, out, quality=quality, threads=jobs or core_count(), seed=seed,
-            command=line, report=progress,
+            command=line, report=progress, cache=cache, must_run=renderers,
+            stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
         )  # fmt: skip
+    if cache is not None and cache.trouble:
+        click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)
     index = write_report(out)
     show.verdicts(summary, index)
     sys.exit(summary.exit_code)

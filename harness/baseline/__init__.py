@@ -1,0 +1,1 @@
+"""Approved results: what they are, where they are kept, and how a run stands to them."""

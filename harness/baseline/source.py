@@ -1,0 +1,147 @@
+"""Where baselines come from: a folder of them, a revision of git, or an earlier run."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from harness.baseline.document import LARGEST_BASELINE, Baseline, Kept, StoredImage, parse_baseline
+from harness.baseline.pictures import restore
+from harness.baseline.run_folder import baselines_of_run
+from harness.baseline.store import LARGEST_PICTURE, Store
+from harness.errors import InputError, Problem
+from harness.imagefile import Pixels
+
+FOLDER = "references"  # where baselines lie in a repository
+GIT_SECONDS = 60
+
+
+@dataclass
+class Baselines:
+    """All baselines of one source by (case, renderer), and what of it could not be read."""
+
+    source: str
+    kept: dict[tuple[str, str], Kept] = field(default_factory=dict)
+    unreadable: list[Problem] = field(default_factory=list)
+    revision: str = ""
+
+    def add(self, data: bytes, file: Path) -> None:
+        """Takes in the baseline `data` from `file`; what is wrong with it is remembered."""
+        try:
+            kept = parse_baseline(data, file)
+        except InputError as error:
+            self.unreadable += error.problems
+            return
+        key = (kept.baseline.case, kept.baseline.renderer)
+        if (other := self.kept.setdefault(key, kept)) is not kept:
+            self.unreadable.append(Problem(f"the same case as {other.file}", file=file))
+
+    def picture(self, kept: Kept, image: StoredImage) -> Pixels:
+        """The approved picture. Raises InputError where it is not kept, missing or damaged."""
+        file = kept.file.with_name(image.file) if image.file else kept.file
+        if image.file:
+            data = _blob(self.revision, file) if self.revision else _bytes(file)
+        elif image.store:
+            data = Store(image.store).get(image.sha256)
+        else:
+            raise InputError.of(f"the picture '{image.role}' was not kept", file=file)
+        return restore(image, data, file)
+
+
+def open_baselines(where: str) -> Baselines:
+    """The baselines that `where` names: a folder, a run's folder, or a revision of git.
+
+    Raises InputError where it is none of these. Single files that cannot be read are in
+    `unreadable`.
+    """
+    path = Path(where)
+    if (path / "summary.json").is_file():
+        return _of_run(path)
+    if path.is_dir():
+        return _of_folder(path)
+    if path.exists():
+        raise InputError.of("not a folder of baselines or of a run", file=path)
+    return _of_revision(where)
+
+
+def _of_folder(folder: Path) -> Baselines:
+    found = Baselines(str(folder))
+    for file in sorted(folder.rglob("*.json")):
+        try:
+            found.add(_bytes(file, LARGEST_BASELINE), file)
+        except InputError as error:
+            found.unreadable += error.problems
+    return found
+
+
+def _of_run(folder: Path) -> Baselines:
+    found = Baselines(f"the run in {folder}")
+    for kept in baselines_of_run(folder):
+        found.kept[kept.baseline.case, kept.baseline.renderer] = kept
+    return found
+
+
+def _of_revision(revision: str) -> Baselines:
+    commit = _git("rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}")
+    if commit is None:
+        raise InputError.of(
+            "neither a folder nor a revision of git", key="--baseline", value=revision[:80],
+            expected="a folder of baselines, the folder of a run, or a commit, branch or tag",
+        )  # fmt: skip
+    name = commit.decode().strip()
+    found = Baselines(f"{FOLDER} at {revision} ({name[:12]})", revision=name)
+    for path in _tree(name):
+        if path.suffix == ".json":
+            try:
+                found.add(_blob(name, Path(path)), Path(path))
+            except InputError as error:
+                found.unreadable += error.problems
+    return found
+
+
+def _tree(commit: str) -> Iterator[PurePosixPath]:
+    listed = _git("ls-tree", "-r", "-z", "--name-only", commit, "--", FOLDER)
+    if listed is None:
+        raise InputError.of(f"{FOLDER} cannot be listed at {commit[:12]}", key="--baseline")
+    for name in listed.split(b"\0"):
+        if name:
+            yield PurePosixPath(name.decode("utf-8", "replace"))
+
+
+def _blob(commit: str, file: Path) -> bytes:
+    data = _git("cat-file", "blob", f"{commit}:./{file.as_posix()}")
+    if data is None:
+        raise InputError.of(f"is not at {commit[:12]}", file=file)
+    if len(data) > LARGEST_PICTURE:
+        raise InputError.of(f"larger than {LARGEST_PICTURE} bytes", file=file)
+    return data
+
+
+def _git(*arguments: str) -> bytes | None:
+    """What git says, None where it fails."""
+    try:
+        done = subprocess.run(
+            ["git", *arguments], capture_output=True, check=False, timeout=GIT_SECONDS
+        )
+    except (OSError, ValueError, subprocess.TimeoutExpired):
+        return None
+    return done.stdout if done.returncode == 0 else None
+
+
+def _bytes(file: Path, most: int = LARGEST_PICTURE) -> bytes:
+    try:
+        with file.open("rb") as opened:
+            data = opened.read(most + 1)
+    except OSError as error:
+        raise InputError.of(f"cannot be read: {error.strerror}", file=file) from error
+    if len(data) > most:
+        raise InputError.of(f"larger than {most} bytes", file=file)
+    return data
+
+
+def find(baselines: Baselines, case: str, renderer: str) -> Baseline | None:
+    """The approved results of `renderer` for `case`."""
+    kept = baselines.kept.get((case, renderer))
+    return kept.baseline if kept else None

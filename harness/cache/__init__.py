@@ -1,0 +1,1 @@
+"""What was rendered and measured before, found again by the hash of all that determines it."""

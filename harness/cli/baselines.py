@@ -1,0 +1,112 @@
+"""What the terminal shows of baselines, and which of them the commands mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from harness.record import BaselineState, Summary
+
+if TYPE_CHECKING:
+    from harness.baseline.approve import Plan
+    from harness.baseline.source import Baselines
+
+FOLDER = Path("references")
+MOST_LINES = 40
+STYLE = {
+    BaselineState.SAME: "green", BaselineState.DRIFTED: "yellow",
+    BaselineState.IMPROVED: "green", BaselineState.NEW: "cyan",
+    BaselineState.RENDERER_CHANGED: "yellow", BaselineState.REGRESSED: "bold red",
+    BaselineState.MISSING: "bold red", BaselineState.STALE: "bold red",
+}  # fmt: skip
+reason_option = click.option("--reason", default="", help="Why this is how it should be.")
+run_option = click.option(
+    "--run", "folder", type=click.Path(path_type=Path, file_okay=False),
+    default=Path("reports/latest"), show_default=True, help="Folder of the run.",
+)  # fmt: skip
+
+
+def default_baseline() -> str:
+    """The folder of this repository; where it has none, the one that came with snellcheck."""
+    from harness.data import references_root
+
+    return str(FOLDER if FOLDER.is_dir() else references_root())
+
+
+def stand_in_sources() -> list[Baselines]:
+    """Where results of missing renderers are looked for: here first, then what came along."""
+    from harness.baseline.source import open_baselines
+    from harness.data import references_root
+
+    folders = dict.fromkeys(f.resolve() for f in (FOLDER, references_root()) if f.is_dir())
+    return [open_baselines(str(folder)) for folder in folders]
+
+
+def show_states(summary: Summary, console: Console | None = None) -> None:
+    """Counts by state, then every check that is not as approved, the worst first."""
+    from harness.baseline.compare import WORST_FIRST
+
+    console = console or Console()
+    found = summary.baseline
+    assert found is not None
+    lines = [
+        (lost.state, f"{lost.case} {lost.check or lost.renderer}".rstrip(), lost.reason)
+        for lost in found.lost
+    ]
+    lines += [
+        (check.baseline.state, f"{case.id} {check.id}", check.baseline.reason)
+        for case in summary.cases
+        for check in case.checks
+        if check.baseline is not None and check.baseline.state is not BaselineState.SAME
+    ]
+    new = [line for line in lines if line[0] is BaselineState.NEW]
+    lines = [line for line in lines if line[0] is not BaselineState.NEW]
+    lines.sort(key=lambda line: WORST_FIRST.index(line[0]))
+    for state, name, reason in lines[:MOST_LINES]:
+        console.print(f"[{STYLE[state]}]{state.value}[/] {escape(name)}: {escape(reason)}")
+    if len(lines) > MOST_LINES:
+        console.print(f"… and {len(lines) - MOST_LINES} more; the report has them all")
+    for trend in found.trends:
+        console.print(
+            f"[yellow]drifting[/] {escape(trend.case)} {escape(trend.check)}: "
+            f"{escape(trend.reason)} (p = {trend.p_value:.1g})"
+        )
+    if new:
+        console.print(f"{len(new)} checks were never approved; `snellcheck approve` does that")
+    said = ", ".join(
+        f"[{STYLE[state]}]{found.counts[state.value]} {state.value}[/]"
+        for state in WORST_FIRST
+        if state.value in found.counts
+    )
+    console.print(f"Against {escape(found.source)}: {said or 'nothing to compare with'}")
+
+
+def show_plans(plans: Sequence[Plan], console: Console | None = None) -> None:
+    """What approving would change, check by check."""
+    console = console or Console()
+    needed = [plan for plan in plans if plan.needed]
+    table = Table("case", "renderer", "check", "state", "approved", "now", title_justify="left")
+    for plan in needed:
+        if plan.kept is None:
+            count = sum(1 for change in plan.changes if change.state is not BaselineState.MISSING)
+            table.add_row(
+                escape(plan.record.id), escape(plan.run.name), f"all {count}", "new", "nothing", ""
+            )
+            continue
+        for change in plan.changes:
+            state = f"[{STYLE[change.state]}]{change.state.value}[/]"
+            table.add_row(
+                escape(plan.record.id), escape(plan.run.name), escape(change.check), state,
+                escape(change.before), escape(change.after),
+            )  # fmt: skip
+    if needed:
+        console.print(table)
+    same = len(plans) - len(needed)
+    if same:
+        console.print(f"{same} results are as they were approved; nothing changes for them")

@@ -1,0 +1,58 @@
+"""`snellcheck check`: a run against approved results."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from harness.cli.baselines import default_baseline, run_option, show_states
+from harness.cli.errors import reports_errors
+
+
+@click.command(name="check")
+@click.argument("case", nargs=-1)
+@run_option
+@click.option(
+    "--baseline", "where", metavar="DIR|GIT-REV|RUN",
+    help="Folder of baselines, a revision that has one, or an earlier run.  [default: references]",
+)  # fmt: skip
+@click.option("--renderer", "-r", "renderers", multiple=True, metavar="NAME", help="Only these.")
+@click.option(
+    "--history", type=click.Path(path_type=Path, file_okay=False, exists=True),
+    help="Folder of earlier runs, to find slow drift.",
+)  # fmt: skip
+@reports_errors
+def command(
+    case: tuple[str, ...],
+    folder: Path,
+    where: str | None,
+    renderers: tuple[str, ...],
+    history: Path | None,
+) -> None:
+    """Compare a run with what was approved: all CASEs, or those a glob like "slab-*" selects.
+
+    Fails with 1 where a check has regressed, is missing, or was approved for another scene. The
+    states are written into the run's records and shown in its report.
+    """
+    from harness.baseline.compare import compare
+    from harness.baseline.outcome import outcome, write_outcome
+    from harness.baseline.run_folder import read_run
+    from harness.baseline.select import selector
+    from harness.baseline.source import open_baselines
+    from harness.baseline.trend import deviations, read_history, trends
+    from harness.report import write_report
+
+    run = read_run(folder)
+    baselines = open_baselines(where or default_baseline())
+    wanted = selector(case, renderers, run, baselines)
+    comparison = compare(run, baselines, wanted)
+    earlier = read_history(history) if history else []
+    runs = [*(s for s in earlier if s.started != run.summary.started), run.summary]
+    found = outcome(comparison, baselines.source, trends(deviations(runs)))
+    summary = write_outcome(run, comparison, found)
+    index = write_report(folder)
+    show_states(summary)
+    click.echo(f"Report: {index}")
+    sys.exit(1 if found.failed else 0)
