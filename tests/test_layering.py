@@ -41,8 +41,8 @@ LAYERS = (
     ("report",),
     ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
     ("parcel", "memo", "bundle", "lanes", "session", "run"),
-    ("doctor",),
-    ("show", "cli"),
+    ("doctor", "ci"),
+    ("show", "cli", "pytest_plugin"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 
