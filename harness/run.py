@@ -40,6 +40,8 @@ def run(
     quality: str = "normal",
     threads: int = 2,
     seed: int = 0,
+    timeout_s: float = RenderSettings.timeout_s,
+    memory_mb: int = RenderSettings.memory_mb,
     command: str = "",
     stand_ins: StandIns | None = None,
     must_run: Collection[str] = (),
@@ -64,7 +66,7 @@ def run(
     for name in names:
         if names.count(name) > 1:
             raise InputError.of("two renderers of one name", key="--renderer", value=name)
-    settings = RenderSettings(samples=SAMPLES[quality], seed=seed, threads=threads)
+    settings = RenderSettings(SAMPLES[quality], seed, threads, timeout_s, memory_mb)
     with _alone(out):
         passing = Cache(FolderStore(out / UNFINISHED), limit=2**50)
         archive = Archive(out)

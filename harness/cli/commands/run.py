@@ -34,6 +34,22 @@ from harness.cli.options import (
     show_default=True,
     help="Let approved results stand in for renderers that are missing.",
 )
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0.1),
+    default=120.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="After which a render counts as hung.",
+)
+@click.option(
+    "--memory",
+    type=click.IntRange(64),
+    default=4096,
+    show_default=True,
+    metavar="MB",
+    help="That a renderer may use.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @quality_option
 @scenes_option
@@ -49,6 +65,8 @@ def command(
     out: Path,
     jobs: int | None,
     stored: bool,
+    timeout: float,
+    memory: int,
     seed: int,
     quality: str,
     scenes: Path | None,
@@ -85,7 +103,8 @@ def command(
     with show.progress() as progress, terminable():
         summary = run_cases(
             cases, chosen, helper, out, quality=quality, threads=jobs or core_count(), seed=seed,
-            command=line, report=progress, cache=cache, must_run=renderers,
+            timeout_s=timeout, memory_mb=memory, command=line, report=progress, cache=cache,
+            must_run=renderers,
             stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
         )  # fmt: skip
     if cache is not None and cache.trouble:
