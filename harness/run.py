@@ -20,6 +20,7 @@ from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdic
 from harness.renderers.base import Renderer, RenderSettings
 from harness.results import Contender
 from harness.session import Progress, Session, Storage
+from harness.shard import write_times
 
 __all__ = ["EXIT_INTERRUPTED", "HELPER", "SAMPLES", "UNFINISHED", "Progress", "exit_code", "run"]
 
@@ -85,6 +86,7 @@ def run(
         finally:
             session.close()
         summary = _summary(session, command, must_run, interrupted)
+        write_times(out, session.records)
         record.write(summary, out / "summary.json")
         if not interrupted:
             shutil.rmtree(out / UNFINISHED, ignore_errors=True)

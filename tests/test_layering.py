@@ -37,7 +37,7 @@ LAYERS = (
     ("verdict", "preflight", "attribution"),
     ("report",),
     ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "run"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
     ("doctor",),
     ("show", "cli"),
 )
