@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite references test lint format lock clean
+.PHONY: help setup suite catalogue references test lint format lock ui clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -10,7 +10,10 @@ help: ## Say what can be made
 setup: ## Install what is missing: the Python environment, POV-Ray, libLLVM
 	@scripts/setup
 
-suite: setup ## Run the conformance suite and write reports/latest/index.html
+suite: setup ## Run the core of the conformance suite and write reports/latest/index.html
+	@$(BIN)/snellcheck run core $(ARGS)
+
+catalogue: setup ## Run all cases, not only those of the suite's core
 	@$(BIN)/snellcheck run $(ARGS)
 
 references: setup ## Measure the committed baselines anew: make references REASON="…"
@@ -32,6 +35,9 @@ format: setup ## Mend what of the style can be mended by a program
 
 lock: ## Rebuild requirements/*.txt from pyproject.toml (UPGRADE=1: newer versions)
 	@scripts/lock
+
+ui: ## Rebuild the report's script from harness/report/ui (needs Node)
+	@cd harness/report/ui && npm ci --silent && npm run --silent build
 
 clean: ## Remove the environment, caches and reports
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

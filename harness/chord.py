@@ -1,4 +1,4 @@
-"""Where a line enters and leaves a convex solid, in closed form and in numpy.
+"""Where a line enters and leaves a solid, in closed form and in numpy.
 
 The truth's own geometry: written apart from the tracer's, so that a mistake in one is not a mistake
 in both.
@@ -6,22 +6,12 @@ in both.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from harness.expected import Float
-from harness.scene.resolved import Convex, Cylinder, Mesh, Solid, Sphere
-
-
-@dataclass(frozen=True)
-class Chord:
-    """Where lines enter and leave a convex solid; t_in > t_out where they miss it."""
-
-    t_in: Float
-    t_out: Float
-    n_in: Float
-    n_out: Float
+from harness.intervals import Chord, planes_chord
+from harness.lens_chord import cone_chord, lens_chords
+from harness.scene.resolved import Cone, Convex, Cylinder, Lens, Mesh, Solid, Sphere
 
 
 def _sphere_chord(sphere: Sphere, o: Float, d: Float) -> Chord:
@@ -36,29 +26,6 @@ def _sphere_chord(sphere: Sphere, o: Float, d: Float) -> Chord:
     n_in = (closest - finite * d) / sphere.radius
     n_out = (closest + finite * d) / sphere.radius
     return Chord(t_in, t_out, n_in, n_out)
-
-
-def _planes_chord(planes: Float, o: Float, d: Float, chunk: int = 1 << 15) -> Chord:
-    """`planes` (k, 4) as n . p <= w.
-
-    Works through `chunk` plane-ray pairs at a time, few enough to stay in the processor's cache.
-    """
-    m = len(o)
-    out = [np.empty(m), np.empty(m), np.empty((m, 3)), np.empty((m, 3))]
-    step = max(1, chunk // len(planes))
-    for start in range(0, m, step):
-        rows = slice(start, start + step)
-        slope = d[rows] @ planes[:, :3].T
-        height = planes[:, 3] - o[rows] @ planes[:, :3].T
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            t = height / slope
-        entering = np.where(slope < 0, t, np.where((slope == 0) & (height < 0), np.inf, -np.inf))
-        leaving = np.where(slope > 0, t, np.inf)
-        first, last = entering.argmax(1), leaving.argmin(1)
-        index = np.arange(len(first))
-        out[0][rows], out[1][rows] = entering[index, first], leaving[index, last]
-        out[2][rows], out[3][rows] = planes[first, :3], planes[last, :3]
-    return Chord(*out)
 
 
 def _cylinder_chord(cylinder: Cylinder, o: Float, d: Float) -> Chord:
@@ -79,7 +46,7 @@ def _cylinder_chord(cylinder: Cylinder, o: Float, d: Float) -> Chord:
     )
     side_out = np.where(parallel, np.inf, np.where(h2 > 0, side_out, -np.inf))
     half = cylinder.height / 2
-    caps = _planes_chord(
+    caps = planes_chord(
         np.array([[*frame.z, half + np.dot(frame.z, frame.origin)],
                   [*(-np.array(frame.z)), half - np.dot(frame.z, frame.origin)]]), o, d
     )  # fmt: skip
@@ -129,11 +96,21 @@ class Body:
             else None
         )
 
-    def chord(self, o: Float, d: Float) -> Chord:
+    def chords(self, o: Float, d: Float) -> list[Chord]:
+        """The intervals in which lines are in the solid: one where it is convex.
+
+        Raises ValueError where the shape has no closed form.
+        """
         shape = self.solid.shape
-        if isinstance(shape, Sphere):
-            return _sphere_chord(shape, o, d)
-        if isinstance(shape, Cylinder):
-            return _cylinder_chord(shape, o, d)
-        assert self._planes is not None
-        return _planes_chord(self._planes, o, d)
+        if self._planes is not None:
+            return [planes_chord(self._planes, o, d)]
+        match shape:
+            case Sphere():
+                return [_sphere_chord(shape, o, d)]
+            case Cylinder():
+                return [_cylinder_chord(shape, o, d)]
+            case Cone():
+                return [cone_chord(shape, o, d)]
+            case Lens():
+                return lens_chords(shape, o, d)
+        raise ValueError(f"a {shape.type} has no closed form")

@@ -8,6 +8,8 @@ Angles are radians unless a name says otherwise; directions are unit vectors alo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,6 +29,21 @@ def critical_angle(ior_i: float, ior_t: float) -> float:
     return float(np.arcsin(ior_t / ior_i))
 
 
+def brewster_angle(ior_i: float, ior_t: float) -> float:
+    """atan(ior_t / ior_i): there the reflected and the refracted ray are perpendicular."""
+    return float(np.arctan2(ior_t, ior_i))
+
+
+def brewster_reflectance(ior_i: float, ior_t: float) -> float:
+    """Unpolarised reflectance at Brewster's angle, where R_p = 0: R_s / 2, Hecht section 4.6.3.
+
+    With n = ior_t / ior_i, cos(theta_i) = sin(theta_t) = 1 / sqrt(1 + n^2), so
+    r_s = (1 - n^2) / (1 + n^2).
+    """
+    n2 = (ior_t / ior_i) ** 2
+    return float(((1 - n2) / (1 + n2)) ** 2 / 2)
+
+
 def lecture_table_angle(theta_i: Float) -> Float:
     """The lecture's printed theta_r: two thirds of theta_i. An erratum, kept to recognise it."""
     return 2.0 / 3.0 * theta_i
@@ -39,6 +56,18 @@ def slab_offset(theta_i: Float, thickness: float, ior: float) -> Float:
     """
     s = np.sin(theta_i)
     return np.asarray(thickness * s * (1 - np.cos(theta_i) / np.sqrt(ior**2 - s**2)))
+
+
+def stack_offset(theta_i: Float, layers: Sequence[tuple[float, float]]) -> Float:
+    """Sideways shift by parallel `layers` of (thickness, relative index).
+
+    The sum of their own shifts, cos(i) sum t (tan i - tan t_k); a gap of index 1 adds nothing.
+    """
+    s, c = np.sin(theta_i), np.cos(theta_i)
+    shift = np.zeros_like(np.asarray(theta_i, np.float64))
+    for thickness, ior in layers:
+        shift = shift + thickness * s * (1 - c / np.sqrt(ior**2 - s**2))
+    return np.asarray(shift)
 
 
 def prism_deviation(theta_i: Float, apex: float, ior: float) -> Float:

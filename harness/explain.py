@@ -58,6 +58,8 @@ class Explainer:
                 yield piece
 
     def _piece(self, contender: Contender, probe: model.Probe) -> Evidence | None:
+        if probe.measure == "all-light":
+            return None  # many paths at once fit no single cause
         truth, preflight = self._truth_of(probe), contender.ready()
         precision = contender.precision(self._case.scene)
         thin = Capability.THIN_SLAB in contender.capabilities and any(
@@ -121,7 +123,11 @@ def _witnesses(
 def _measuring(case: PreparedCase) -> list[model.Probe]:
     """The probes of which every ray is checked, not only where light ends."""
     used = {c.probe for c in case.loaded.model.checks if c.observable not in BOUNDARIES}
-    return [probe for probe in case.loaded.model.probes if probe.name in used]
+    return [
+        probe
+        for probe in case.loaded.model.probes
+        if probe.name in used and probe.measure != "all-light"
+    ]
 
 
 def _truth_as_evidence(case: PreparedCase, probe: model.Probe) -> Evidence:

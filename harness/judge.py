@@ -9,25 +9,33 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from harness import plan
 from harness.attribution import attributed
 from harness.explain import Explainer
-from harness.measure import light_observables, radiance, ray_observables
+from harness.measure import (
+    flat_observables,
+    focus_observables,
+    light_observables,
+    radiance,
+    ray_observables,
+    total_light,
+)
+from harness.measure.agreement import optical_length, ray_agreement, variant_agreement
 from harness.measure.comparison import Comparison, Unmeasurable
-from harness.measure.observables import IMAGE_OBSERVABLES, Observable
-from harness.measure.probe_truth import ProbeTruth, probe_truth
+from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
+    IMAGE_OBSERVABLES,
+    RAY_API_OBSERVABLES,
+    Observable,
+)
 from harness.measure.raymap import ProbeRays
-from harness.measure.rays import RayMeasurement, from_images, from_paths
 from harness.pairs import PairJudge
-from harness.plan import PreparedCase
-from harness.probe.scenes import AXES
+from harness.plan import Form, PreparedCase
+from harness.probed import Probed
 from harness.record import Check, Curve, Diagnosis, Verdict
-from harness.renderers.base import Capability, RayPaths
+from harness.renderers.base import Capability
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
-from harness.scene.resolve import expand_thin_slabs
 from harness.verdict import check_id, judge, unmeasured
 
 # The chance of a false alarm of one check of a sampled picture, over all of its means. A suite of
@@ -44,6 +52,19 @@ RAYS = {
     Observable.INVERSION: ray_observables.inversion,
     Observable.TESSELLATION_ERROR: ray_observables.tessellation_error,
     Observable.TIR: ray_observables.tir,
+    Observable.BREWSTER_ANGLE: flat_observables.brewster_angle,
+    Observable.STACK_OFFSET: flat_observables.stack_offset,
+    Observable.FOLDED_DIRECTION: flat_observables.folded_direction,
+    Observable.REVERSIBILITY: flat_observables.reversibility,
+    Observable.SAGITTAL_DEPTH: flat_observables.sagittal_depth,
+    Observable.TANGENTIAL_DEPTH: flat_observables.tangential_depth,
+    Observable.FOCUS: focus_observables.focus,
+    Observable.FOCAL_LENGTH: focus_observables.focal_length,
+    Observable.BACK_FOCAL_LENGTH: focus_observables.back_focal_length,
+    Observable.SPHERICAL_ABERRATION: focus_observables.spherical_aberration,
+    Observable.APLANATIC_IMAGE: focus_observables.aplanatic_image,
+    Observable.RAINBOW_ANGLE: focus_observables.rainbow_angle,
+    Observable.OPTICAL_LENGTH: optical_length,
 }
 BOUNDARIES = {
     Observable.CRITICAL_ANGLE: light_observables.critical_angle,
@@ -75,118 +96,166 @@ class CaseJudge:
     ) -> None:
         self._case, self._contenders, self._results = case, contenders, results
         self._pairs = PairJudge(case.scene, results, helper)
-        self._truths: dict[str, ProbeTruth] = {}
-        self._rays: dict[tuple[str, str], RayMeasurement] = {}
+        self._probed = Probed(case, results)
 
     def judge(self) -> Judgement:
         """Judges all checks; what cannot be measured is SKIP or ERROR with its reason."""
         judgement = Judgement()
         for spec in self._case.loaded.model.checks:
-            contenders = [
-                c for c in self._contenders if not spec.renderers or c.name in spec.renderers
-            ]
+            contenders = list(self._asked(spec))
             if spec.against == "truth":
                 for contender in contenders:
-                    check, curve = self._against_truth(spec, contender)
-                    judgement.checks.append(check)
-                    if curve is not None:
-                        _merge(judgement.curves, spec, curve, contender.name)
+                    judgement.checks += self._in_all_forms(spec, contender, judgement.curves)
             else:
                 judgement.checks += self._pairs.checks(spec, contenders, self._contenders)
         judgement.checks = attributed(judgement.checks)
-        explainer = Explainer(self._case, self._results, self._truth, self._measured)
+        base, probed = self._probed.forms[0], self._probed
+        explainer = Explainer(
+            self._case,
+            self._results,
+            lambda probe: probed.truth(probe, base),
+            lambda contender, probe: probed.rays(contender, probe, base),
+        )
         found = (explainer.explain(c, judgement.checks) for c in self._contenders)
         judgement.diagnoses = [diagnosis for diagnosis in found if diagnosis is not None]
-        judgement.rays = [ProbeRays(*item) for item in self._measured_probes()]
+        judgement.rays = list(probed.measured())
         return judgement
 
-    def _measured_probes(self) -> Iterator[tuple[str, ProbeTruth, dict[str, RayMeasurement]]]:
-        for probe, truth in self._truths.items():
-            measured = {name: rays for (name, of), rays in self._rays.items() if of == probe}
-            if measured:
-                yield probe, truth, measured
+    def _asked(self, spec: model.CheckSpec) -> Iterator[Contender]:
+        """Those whom the check names, and who have what it is about."""
+        api = Observable(spec.observable) in RAY_API_OBSERVABLES
+        for contender in self._contenders:
+            named = not spec.renderers or contender.name in spec.renderers
+            if named and (not api or Capability.RAYS in contender.capabilities):
+                yield contender
+
+    def _in_all_forms(
+        self, spec: model.CheckSpec, contender: Contender, curves: list[Curve]
+    ) -> Iterator[Check]:
+        """The check of the case itself, of its variants, and of their agreement with it."""
+        base, *variants = self._probed.forms
+        check, curve = self._against_truth(spec, contender, base)
+        if curve is not None:
+            _merge(curves, spec, curve, contender.name)
+        yield check
+        observable = Observable(spec.observable)
+        if observable in IMAGE_OBSERVABLES | {Observable.RAY_AGREEMENT}:
+            return
+        for form in variants:
+            yield self._against_truth(spec, contender, form)[0]
+        if observable is Observable.EXIT_POINT:
+            for form in variants:
+                yield self._against_base(spec, contender, form)
 
     def _against_truth(
-        self, spec: model.CheckSpec, contender: Contender
+        self, spec: model.CheckSpec, contender: Contender, form: Form
     ) -> tuple[Check, Curve | None]:
+        spec = in_form(spec, form)
         if contender.stored is not None:
-            return self._stored(spec, contender), None
+            return self._stored(spec, contender, "truth"), None
         try:
-            comparison = self._compare(spec, contender)
+            comparison = self._compare(spec, contender, form)
         except NotAvailable as gap:
             return unmeasured(spec, contender.name, "truth", gap.status, gap.reason), None
         except (Unmeasurable, ValueError) as error:
             return unmeasured(spec, contender.name, "truth", Verdict.ERROR, str(error)), None
         return judge(spec, contender.name, "truth", comparison), comparison.curve
 
-    def _stored(self, spec: model.CheckSpec, contender: Contender) -> Check:
+    def _against_base(self, spec: model.CheckSpec, contender: Contender, form: Form) -> Check:
+        """Whether the variant shows the same as the case itself, ray by ray."""
+        probe, base = self._case.probe(spec.probe), self._probed.forms[0]
+        spec = agreement(spec, form)
+        if contender.stored is not None:
+            return self._stored(spec, contender, "variant")
+        try:
+            both = [
+                (
+                    self._probed.truth(probe, f),
+                    self._probed.rays(contender, probe, f),
+                    contender.precision(f.scene),
+                )
+                for f in (base, form)
+            ]
+            comparison = variant_agreement(form.scale, both[0], both[1])
+        except NotAvailable as gap:
+            return unmeasured(spec, contender.name, "variant", gap.status, gap.reason)
+        except (Unmeasurable, ValueError) as error:
+            return unmeasured(spec, contender.name, "variant", Verdict.ERROR, str(error))
+        return judge(spec, contender.name, "variant", comparison)
+
+    def _stored(self, spec: model.CheckSpec, contender: Contender, against: str) -> Check:
         """The approved result of a renderer that is not there, marked as such."""
-        check = contender.stored_checks.get(check_id(spec, contender.name, "truth"))
+        check = contender.stored_checks.get(check_id(spec, contender.name, against))
         if check is None or contender.stored is None:
             reason = f"{contender.reason}; nothing is stored for this check"
-            return unmeasured(spec, contender.name, "truth", Verdict.SKIP, reason)
+            return unmeasured(spec, contender.name, against, Verdict.SKIP, reason)
         return check.model_copy(update={"stored": [contender.name]})
 
-    def _compare(self, spec: model.CheckSpec, contender: Contender) -> Comparison:
+    def _compare(self, spec: model.CheckSpec, contender: Contender, form: Form) -> Comparison:
         observable, preflight = Observable(spec.observable), contender.ready()
-        precision = contender.precision(self._case.scene)
+        precision = contender.precision(form.scene)
+        n2 = Capability.RADIANCE_N2 in contender.capabilities
         if observable in IMAGE_OBSERVABLES:
             picture = self._results.picture(contender, plan.IMAGE)
             level = FALSE_ALARM if preflight.noisy else None
             return radiance.against_truth(
                 self._case.scene, picture, preflight.quantum, precision, level
             )
-        probe = self._case.probe(spec.probe)
-        truth = self._truth(probe)
+        probe = self._case.probe(spec.probe.partition("~")[0] if spec.probe else None)
+        truth = self._probed.truth(probe, form)
+        if observable is Observable.RAY_AGREEMENT:
+            ways = (self._probed.traced, self._probed.coded)
+            traced, coded = (way(contender, probe, form) for way in ways)
+            return ray_agreement(truth, traced, coded, precision)
         if observable in RAYS:
-            return RAYS[observable](truth, self._measured(contender, probe), precision)
-        pixels = self._results.picture(contender, plan.light_role(probe))
+            return RAYS[observable](truth, self._probed.rays(contender, probe, form), precision)
+        pixels = self._probed.light(contender, probe, form)
         if observable in BOUNDARIES:
             return BOUNDARIES[observable](truth, pixels, preflight.quantum, preflight.noisy)
-        n2 = Capability.RADIANCE_N2 in contender.capabilities
-        if preflight.noisy:
-            return light_observables.sampled_path_weight(truth, pixels, FALSE_ALARM, n2)
-        return light_observables.path_weight(truth, pixels, precision, preflight.quantum, n2)
+        quantum, noise = preflight.quantum, FALSE_ALARM if preflight.noisy else None
+        if observable in ALL_LIGHT_OBSERVABLES:
+            return total_light.all_light(truth, pixels, precision, quantum, noise, n2)
+        if observable is Observable.BREWSTER_REFLECTANCE:
+            return total_light.brewster_reflectance(truth, pixels, precision, quantum, noise)
+        if noise is not None:
+            return light_observables.sampled_path_weight(truth, pixels, noise, n2)
+        return light_observables.path_weight(truth, pixels, precision, quantum, n2)
 
-    def _truth(self, probe: model.Probe) -> ProbeTruth:
-        if probe.name not in self._truths:
-            scene = expand_thin_slabs(self._case.scene)
-            self._truths[probe.name] = probe_truth(scene, probe.path, self._case.planes(probe))
-        return self._truths[probe.name]
 
-    def _measured(self, contender: Contender, probe: model.Probe) -> RayMeasurement:
-        key = (contender.name, probe.name)
-        if key not in self._rays:
-            self._rays[key] = self._measure(contender, probe)
-        return self._rays[key]
+def in_form(spec: model.CheckSpec, form: Form) -> model.CheckSpec:
+    """The check as one of a variant: what is documented in units grows with it.
 
-    def _measure(self, contender: Contender, probe: model.Probe) -> RayMeasurement:
-        truth, preflight = self._truth(probe), contender.ready()
-        if Capability.RAYS in contender.capabilities:
-            paths = self._results.get(contender, plan.trace_role(probe))
-            if not isinstance(paths, RayPaths):
-                raise NotAvailable(Verdict.ERROR, "the trace delivered an image")
-            if len(paths.status) != len(truth.grazing):
-                reason = f"the trace delivered {len(paths.status)} of {len(truth.grazing)} rays"
-                raise NotAvailable(Verdict.ERROR, reason)
-            return from_paths(paths)
-        images = {
-            (index, axis): self._results.picture(contender, plan.code_role(probe, index, axis))
-            for index in range(len(truth.planes))
-            for axis in AXES
-        }
-        cells = min(preflight.cells, probe.cells)
-        alone = Capability.LOBE_SWITCH in contender.capabilities
-        mixed = np.zeros(len(truth.grazing), bool) if alone else truth.ambiguous
-        return from_images(
-            images,
-            truth,
-            cells,
-            preflight.code_quantum,
-            preflight.epsilon,
-            mixed,
-            preflight.samples,
-        )
+    A documented deviation need not show in every variant, so it has no least size there, unless it
+    is documented for that variant.
+    """
+    own = [k for k in spec.known if form.name in k.variants]
+    general = [k for k in spec.known if not k.variants]
+    if not form.name:
+        return spec.model_copy(update={"known": tuple(general)})
+    grown = form.scale if Observable(spec.observable).unit == "units" else 1.0
+    known = tuple(
+        k.model_copy(update={"at_least": least * grown, "at_most": k.at_most * grown})
+        for k, least in [*((k, k.at_least) for k in own), *((k, 0.0) for k in general)]
+    )
+    tolerance = None if spec.tolerance is None else spec.tolerance * grown
+    probe = plan.probe_label(spec.probe or "", form.name)
+    return spec.model_copy(update={"probe": probe, "known": known, "tolerance": tolerance})
+
+
+def agreement(spec: model.CheckSpec, form: Form) -> model.CheckSpec:
+    """The check that a variant shows what the case itself does, to the sum of their tolerances.
+
+    Where both are documented to be off, they may differ by as much as both are.
+    """
+    both = sorted(spec.known, key=lambda k: form.name not in k.variants)
+    known = tuple(
+        k.model_copy(update={"at_least": 0.0, "at_most": 2 * k.at_most})
+        for k in both
+        if not k.variants or form.name in k.variants
+    )
+    probe = plan.probe_label(spec.probe or "", form.name)
+    update = {"observable": Observable.VARIANT_AGREEMENT, "probe": probe, "known": known}
+    return spec.model_copy(update=update | {"tolerance": None, "derivation": ""})
 
 
 def _merge(curves: list[Curve], spec: model.CheckSpec, curve: Curve, renderer: str) -> None:

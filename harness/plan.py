@@ -6,17 +6,27 @@ judge finds the result again.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.preflight import Preflight
-from harness.probe.scenes import AXES, code_scene, light_scene
+from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene import model
+from harness.scene.findings import SceneInvalid, input_error
 from harness.scene.load import LoadedCase
 from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve
-from harness.scene.resolved import Film, Rectangle, ResolvedScene
+from harness.scene.resolved import (
+    Constant,
+    Emissive,
+    Film,
+    Rectangle,
+    ResolvedScene,
+    Surface,
+)
+from harness.scene.variants import varied
+from harness.translate.mitsuba_scale import scaled
 
 IMAGE = "image"
 SECOND_IMAGE = "image, second seed"
@@ -39,11 +49,31 @@ class Job:
 
 
 @dataclass(frozen=True)
+class Form:
+    """A case as its file has it, name "", or one of its variants; lengths are `scale` as large.
+
+    `planes` are the rectangles on which each probe's rays are caught.
+    """
+
+    name: str
+    scene: ResolvedScene
+    planes: Mapping[str, tuple[Rectangle, ...]]
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
 class PreparedCase:
-    """A case with its resolved scene."""
+    """A case with its resolved scene, and those of its variants."""
 
     loaded: LoadedCase
     scene: ResolvedScene
+    variants: tuple[Form, ...] = ()
+
+    @property
+    def forms(self) -> tuple[Form, ...]:
+        """The case itself and its variants."""
+        probes = self.loaded.model.probes
+        return (Form("", self.scene, {p.name: probe_planes(p) for p in probes}), *self.variants)
 
     @property
     def wants_images(self) -> bool:
@@ -54,6 +84,13 @@ class PreparedCase:
     def compares_images(self) -> bool:
         """Whether any check compares the pictures of two renderers."""
         return any(c.against != "truth" for c in self.loaded.model.checks)
+
+    def compares_rays(self, probe: model.Probe) -> bool:
+        """Whether rays of a ray API are to be compared with coded images."""
+        return any(
+            c.observable == Observable.RAY_AGREEMENT and c.probe == probe.name
+            for c in self.loaded.model.checks
+        )
 
     def probe(self, name: str | None) -> model.Probe:
         """The probe of that name, or the first one."""
@@ -66,8 +103,32 @@ class PreparedCase:
 
 
 def prepare(loaded: LoadedCase) -> PreparedCase:
-    """Resolves the scene. Raises InputError where it cannot be."""
-    return PreparedCase(loaded, resolve(loaded))
+    """Resolves the scene and its variants. Raises InputError where one cannot be."""
+    variants = (_form(loaded, variant) for variant in loaded.model.variants)
+    return PreparedCase(loaded, resolve(loaded), tuple(variants))
+
+
+def _form(loaded: LoadedCase, variant: model.Variant) -> Form:
+    try:
+        other = replace(loaded, model=varied(loaded.model, variant))
+    except SceneInvalid as error:
+        raise input_error(error.findings, loaded.file) from None
+    scene, probes = resolve(other), other.model.probes
+    planes = {p.name: probe_planes(p) for p in probes}
+    if variant.scale == 1.0:
+        return Form(variant.name, scene, planes)
+    shown = {name: _grown(scene, rectangles, variant.scale) for name, rectangles in planes.items()}
+    return Form(variant.name, scaled(scene, variant.scale), shown, variant.scale)
+
+
+def _grown(
+    scene: ResolvedScene, planes: tuple[Rectangle, ...], scale: float
+) -> tuple[Rectangle, ...]:
+    """Planes grow as a scene's surfaces do."""
+    dark = Emissive(pattern=Constant(radiance=(0.0, 0.0, 0.0)))
+    faces = tuple(Surface(name="plane", shape=plane, material=dark) for plane in planes)
+    grown = scaled(scene.model_copy(update={"solids": (), "surfaces": faces}), scale)
+    return tuple(s.shape for s in grown.surfaces if isinstance(s.shape, Rectangle))
 
 
 def scene_for(scene: ResolvedScene, capabilities: Collection[Capability]) -> ResolvedScene:
@@ -90,36 +151,44 @@ def jobs_of(
         if preflight.noisy:
             other = replace(settings, seed=settings.seed + 1)
             jobs.append(Job(renderer, SECOND_IMAGE, scene, other))
-    for probe in case.loaded.model.probes:
-        planes = case.planes(probe)
-        jobs += _probe_jobs(scene, probe, planes, renderer, capabilities, preflight, settings)
+    for form in case.forms:
+        shown = scene_for(form.scene, capabilities)
+        for probe in case.loaded.model.probes:
+            made = _probe_scenes(
+                shown, probe, form, capabilities, preflight, case.compares_rays(probe)
+            )
+            jobs += [
+                Job(renderer, role, made_scene, settings, path) for role, made_scene, path in made
+            ]
     return jobs
 
 
-def _probe_jobs(
+def _probe_scenes(
     scene: ResolvedScene,
     probe: model.Probe,
-    planes: tuple[Rectangle, ...],
-    renderer: str,
+    form: Form,
     capabilities: Collection[Capability],
     preflight: Preflight,
-    settings: RenderSettings,
-) -> list[Job]:
+    both_ways: bool,
+) -> Iterator[tuple[str, ResolvedScene, str | None]]:
+    """Role, scene and, for a trace, path of everything that measures `probe` in one form."""
+    planes = form.planes[probe.name]
+    if probe.measure == "all-light":
+        yield light_role(probe, form.name), all_light_scene(scene, planes[0]), None
+        return
     if probe.measure == "light":
-        light = light_scene(scene, planes[0], probe.path)
-        return [Job(renderer, light_role(probe), light, settings)]
+        yield light_role(probe, form.name), light_scene(scene, planes[0], probe.path), None
+        return
     if Capability.RAYS in capabilities:
         coded = code_scene(scene, planes[0], AXES[0], 1, probe.path)
-        return [Job(renderer, trace_role(probe), coded, settings, probe.path)]
+        yield trace_role(probe, form.name), coded, probe.path
+        if not both_ways or form.name:
+            return
     cells = min(preflight.cells, probe.cells)
-    return [
-        Job(
-            renderer, code_role(probe, index, axis),
-            code_scene(scene, plane, axis, cells, probe.path), settings,
-        )
-        for index, plane in enumerate(planes)
-        for axis in AXES
-    ]  # fmt: skip
+    for index, plane in enumerate(planes):
+        for axis in AXES:
+            coded = code_scene(scene, plane, axis, cells, probe.path, probe.total_reflection)
+            yield code_role(probe, index, axis, form.name), coded, None
 
 
 def auxiliary_jobs(
@@ -151,13 +220,18 @@ def shifted(scene: ResolvedScene, dx: float, dy: float) -> ResolvedScene:
     return scene.model_copy(update={"camera": camera.model_copy(update={"origin": origin})})
 
 
-def light_role(probe: model.Probe) -> str:
-    return f"{probe.name}: light"
+def light_role(probe: model.Probe, form: str = "") -> str:
+    return f"{probe_label(probe.name, form)}: light"
 
 
-def trace_role(probe: model.Probe) -> str:
-    return f"{probe.name}: rays"
+def trace_role(probe: model.Probe, form: str = "") -> str:
+    return f"{probe_label(probe.name, form)}: rays"
 
 
-def code_role(probe: model.Probe, plane: int, axis: str) -> str:
-    return f"{probe.name}: plane {plane} {axis}"
+def code_role(probe: model.Probe, plane: int, axis: str, form: str = "") -> str:
+    return f"{probe_label(probe.name, form)}: plane {plane} {axis}"
+
+
+def probe_label(probe: str, form: str) -> str:
+    """A probe in one form of its case, for people and for ids: ``through~mesh``."""
+    return f"{probe}~{form}" if form else probe

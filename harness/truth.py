@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.chord import Body, Chord
+from harness.chord import Body
 from harness.expected import Float, reflect
+from harness.intervals import Chord
 from harness.law import PHYSICS, Interface, Law, Leg
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Mesh, Rectangle, ResolvedScene
@@ -58,6 +59,18 @@ class Landing:
     transmission: Float
 
 
+@dataclass(frozen=True)
+class Boundary:
+    """The next boundary on each of m rays: distance `t` (infinite where there is none), normal `n`
+    facing the ray, index `which` of its solid, and the medium `beyond` it.
+    """
+
+    t: Float
+    n: Float
+    which: NDArray[np.intp]
+    beyond: NDArray[np.intp]
+
+
 class ClosedForm:
     """A scene prepared for exact tracing. Raises ValueError where it has no closed form.
 
@@ -81,14 +94,13 @@ class ClosedForm:
         interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
         ior = np.array([medium.ior for medium in scene.media])
         sigma = np.array([medium.absorption for medium in scene.media])
-        chords = [body.chord(o, d) for body in bodies]
-        within = [(c.t_in < 0) & (c.t_out > 0) for c in chords]
-        inside = np.array(within, bool).reshape(len(bodies), m)
+        chords = [body.chords(o, d) for body in bodies]
+        inside = _enclosing(chords, m)
         medium = np.full(m, scene.camera.medium, np.intp)
 
         for k, letter in enumerate(path):
             if k:
-                chords = [body.chord(o, d) for body in bodies]
+                chords = [body.chords(o, d) for body in bodies]
             t, n, which = _next_interface(chords, inside)
             status[(status == Status.HIT) & ~np.isfinite(t)] = Status.MISS
             live = status == Status.HIT
@@ -116,16 +128,36 @@ class ClosedForm:
             o = law.start(at, d)
             inside[which[live], np.flatnonzero(live)] ^= True
             medium = np.where(live, beyond, medium)
-        ahead, _, _ = _next_interface([body.chord(o, d) for body in bodies], inside)
+        ahead, _, _ = _next_interface([body.chords(o, d) for body in bodies], inside)
         return TruePaths(
             status, o, d, medium, weight, absorbed, cos_i, eta, interface, normals, inside, ahead
         )
 
     def land(self, paths: TruePaths, plane: Rectangle) -> Landing:
         """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
+        start = paths.n[:, -1] if paths.n.shape[1] else None
+        return self.meet(
+            plane, paths.origin, paths.direction, paths.ahead, paths.medium, paths.absorbed,
+            paths.status, start,
+        )  # fmt: skip
+
+    def meet(
+        self,
+        plane: Rectangle,
+        o: Float,
+        d: Float,
+        ahead: Float,
+        medium: NDArray[np.intp],
+        absorbed: Float,
+        status: NDArray[np.int8] | None = None,
+        start: Float | None = None,
+    ) -> Landing:
+        """The same for rays from `o` along `d`, each (m, 3), whose next interface is `ahead`.
+
+        `start` is the normal of the interface that they come from.
+        """
         frame = plane.frame
-        o, d = paths.origin, paths.direction
-        status = paths.status.copy()
+        status = np.full(len(o), Status.HIT, np.int8) if status is None else status.copy()
         with np.errstate(divide="ignore", invalid="ignore"):
             t = ((np.array(frame.origin) - o) @ np.array(frame.z)) / (d @ np.array(frame.z))
             point = o + t[:, None] * d
@@ -133,39 +165,58 @@ class ClosedForm:
             x, y = local @ np.array(frame.x), local @ np.array(frame.y)
             on = (t > 0) & (np.abs(x) <= plane.size[0] / 2) & (np.abs(y) <= plane.size[1] / 2)
         status[(status == Status.HIT) & ~on] = Status.MISS
-        status[(status == Status.HIT) & (paths.ahead < t)] = Status.CUT
+        status[(status == Status.HIT) & (ahead < t)] = Status.CUT
         landed = status == Status.HIT
         point[~landed] = np.nan
         sigma = np.array([medium.absorption for medium in self.scene.media])
-        start = paths.n[:, -1] if paths.n.shape[1] else None
-        leg = Leg(np.where(landed, t, 0.0), d, sigma[paths.medium], start, "")
-        depth = paths.absorbed + self.law.depth(leg)
+        leg = Leg(np.where(landed, t, 0.0), d, sigma[medium], start, "")
+        depth = absorbed + self.law.depth(leg)
         return Landing(status, point, np.exp(-depth))
+
+    def enclosed(self, rays: Rays) -> NDArray[np.bool_]:
+        """(solids, m) which solids the rays start in."""
+        chords = [body.chords(rays.origins, rays.directions) for body in self._bodies]
+        return _enclosing(chords, len(rays.origins))
+
+    def next_interface(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Boundary:
+        """The next boundary of rays from `o` along `d` that are in the solids `inside`."""
+        chords = [body.chords(o, d) for body in self._bodies]
+        t, n, which = _next_interface(chords, inside)
+        rows = np.arange(len(o))
+        leaving = inside[which, rows] if self._bodies else np.zeros(len(o), bool)
+        facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
+        return Boundary(t, facing, which, _beyond(self._bodies, which, leaving))
+
+
+def _enclosing(chords: list[list[Chord]], m: int) -> NDArray[np.bool_]:
+    """(solids, m) which solids lines start in."""
+    within = [np.any([(c.t_in < 0) & (c.t_out > 0) for c in parts], axis=0) for parts in chords]
+    return np.array(within, bool).reshape(len(chords), m)
 
 
 def _next_interface(
-    chords: list[Chord], inside: NDArray[np.bool_]
+    chords: list[list[Chord]], inside: NDArray[np.bool_]
 ) -> tuple[Float, Float, NDArray[np.intp]]:
     """Distance, outward normal and solid of the next boundary; infinite where there is none.
 
-    Which root of a solid counts is known from whether the ray is inside it, so no distance has to
+    Which roots of a solid count is known from whether the ray is inside it, so no distance has to
     be thresholded and a slab of any thinness is seen.
     """
     m = inside.shape[1]
-    if not chords:
-        return np.full(m, np.inf), np.zeros((m, 3)), np.zeros(m, np.intp)
-    candidates = np.array(
-        [
-            np.where(within, c.t_out, np.where((c.t_in > 0) & (c.t_in < c.t_out), c.t_in, np.inf))
-            for c, within in zip(chords, inside, strict=True)
-        ]
-    )
-    nearest = candidates.argmin(0)
-    rows = np.arange(m)
-    n = np.array(
-        [np.where(w[:, None], c.n_out, c.n_in) for c, w in zip(chords, inside, strict=True)]
-    )
-    return candidates[nearest, rows], n[nearest, rows], nearest
+    best, normal, which = np.full(m, np.inf), np.zeros((m, 3)), np.zeros(m, np.intp)
+    for k, (parts, within) in enumerate(zip(chords, inside, strict=True)):
+        for c in parts:
+            there = c.t_in < c.t_out
+            if len(parts) == 1:  # convex: whoever is inside leaves by its one exit
+                leaves = np.where(within, c.t_out, np.inf)
+            else:
+                leaves = np.where(within & there & (c.t_out > 0), c.t_out, np.inf)
+            t = np.where(within, leaves, np.where(there & (c.t_in > 0), c.t_in, np.inf))
+            nearer = t < best
+            best = np.where(nearer, t, best)
+            n = np.where(within[:, None], c.n_out, c.n_in)
+            normal, which = np.where(nearer[:, None], n, normal), np.where(nearer, k, which)
+    return best, normal, which
 
 
 def _beyond(

@@ -16,7 +16,7 @@ def judge(spec: CheckSpec, renderer: str, against: str, comparison: Comparison) 
     A tolerance that the scene states replaces the derived one and is held against the worst ray or
     pixel. A documented deviation is KNOWN only while its size stays within its stated bounds, and
     FAILs when it is gone: then the scene is out of date. What a comparison calls a fault is none
-    that any tolerance or document excuses.
+    that any tolerance excuses, and no document but one that says how many rays go astray.
     """
     tolerance, derivation = comparison.tolerance, comparison.derivation
     within = comparison.within and not comparison.fault
@@ -30,13 +30,21 @@ def judge(spec: CheckSpec, renderer: str, against: str, comparison: Comparison) 
         return unmeasured(spec, renderer, against, Verdict.ERROR, "the measurement is not finite")
     unit = Observable(spec.observable).unit
     known = next((k for k in spec.known if k.renderer in (renderer, against)), None)
-    status, reason = _status(within, error, tolerance, unit, comparison.fault, known)
+    fault = comparison.fault
+    if known and 0 < _astray(comparison) <= known.astray:
+        within, fault = False, ""
+    status, reason = _status(within, error, tolerance, unit, fault, known)
     return Check(
         id=check_id(spec, renderer, against), renderer=renderer, against=against,
         observable=spec.observable, value=comparison.value, expected=comparison.expected,
         tolerance=tolerance, unit=unit, status=status, reason=reason, derivation=derivation,
         detail=comparison.detail,
     )  # fmt: skip
+
+
+def _astray(comparison: Comparison) -> int:
+    """How many rays were lost, or came where none should."""
+    return sum(int(comparison.detail.get(name, 0)) for name in ("lost", "ghosts"))
 
 
 def _status(

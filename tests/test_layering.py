@@ -23,12 +23,15 @@ ROOT = Path(__file__).resolve().parent.parent
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
     ("errors", "data", "cores", "fingerprint", "documents", "outcomes"),
-    ("record", "imagefile", "expected", "law", "measure.observables"),
+    ("record", "imagefile", "expected", "expected_systems", "law", "measure.observables"),
     ("cache",),
     ("scene",),
     ("renderers.base",),
+    ("intervals",),
+    ("lens_chord",),
     ("camera", "chord", "section", "translate"),
     ("truth",),
+    ("tree",),
     ("renderers",),
     ("probe",),
     ("measure",),
@@ -36,10 +39,10 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight", "attribution"),
     ("report",),
-    ("baseline", "plan", "results", "pairs", "explain", "judge", "packing", "archive"),
+    ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
     ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
-    ("doctor",),
-    ("show", "cli"),
+    ("doctor", "ci"),
+    ("show", "cli", "pytest_plugin"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 

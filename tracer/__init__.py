@@ -13,12 +13,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tracer.camera import Orthographic as Orthographic
     from tracer.camera import Perspective as Perspective
+    from tracer.camera import ThinLens as ThinLens
     from tracer.errors import SceneError as SceneError
+    from tracer.film import Box as Box
+    from tracer.film import Gaussian as Gaussian
+    from tracer.film import Sampling as Sampling
+    from tracer.image import Render as Render
+    from tracer.image import render as render
+    from tracer.image import render_spectrum as render_spectrum
     from tracer.mesh import Mesh as Mesh
     from tracer.path import Paths as Paths
     from tracer.path import follow as follow
-    from tracer.recursion import Render as Render
-    from tracer.recursion import render as render
     from tracer.scene import Medium as Medium
     from tracer.scene import Scene as Scene
     from tracer.scene import Solid as Solid
@@ -29,12 +34,17 @@ __version__ = "0.1.0"
 _HOME = {
     "Orthographic": "camera",
     "Perspective": "camera",
+    "ThinLens": "camera",
+    "Box": "film",
+    "Gaussian": "film",
+    "Sampling": "film",
     "SceneError": "errors",
     "Mesh": "mesh",
     "Paths": "path",
     "follow": "path",
-    "Render": "recursion",
-    "render": "recursion",
+    "Render": "image",
+    "render": "image",
+    "render_spectrum": "image",
     "Medium": "scene",
     "Scene": "scene",
     "Solid": "scene",

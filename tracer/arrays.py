@@ -9,14 +9,17 @@ from numpy.typing import NDArray
 
 from tracer.errors import SceneError
 from tracer.mesh import LEFT, RIGHT, WORDS, Mesh, Tree, grow_tree, require_closed
-from tracer.patterns import Constant, Picture, pattern_row
+from tracer.patterns import Constant, Pattern, Picture, pattern_row
 from tracer.scene import (
     VACUUM,
     Diffuse,
+    DirectionalLight,
     Emissive,
     Material,
     Medium,
     Mirror,
+    Phong,
+    PointLight,
     Scene,
     Shape,
     Solid,
@@ -32,6 +35,7 @@ Floats = NDArray[np.float64]
 # Kinds of shapes, and of what they bound.
 SPHERE, CELL, COMPOUND, MESH, RECTANGLE, DISK = range(6)
 DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
+POINT, DIRECTIONAL = 0.0, 1.0
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
 SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS = range(8)
@@ -42,13 +46,13 @@ class Arrays(NamedTuple):
 
     objects: NDArray[np.int64]  # (n, 8)
     balls: Floats  # (n, 4): centre and squared radius of a sphere around it
-    materials: Floats  # (n, 7): two colours and a thickness
+    materials: Floats  # (n, 9): two colours, thickness, highlight and its exponent
     rows: Floats  # shapes
-    media: Floats  # (m, 4): ior, absorption
+    media: Floats  # (m, 5): ior, absorption, 1 where it disperses
     patterns: Floats
     texels: Floats
-    lights: Floats  # (l, 6): position, intensity
-    background: Floats  # (1, 3)
+    lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
+    background: Floats  # (1, 9): a pattern's row
     nodes: NDArray[np.float32]  # of all meshes' trees
     links: NDArray[np.int32]  # the same memory
     triangles: Floats
@@ -58,20 +62,18 @@ class Arrays(NamedTuple):
 class _Flattener:
     """Collects rows while it walks over a scene."""
 
-    def __init__(self) -> None:
+    def __init__(self, media: list[Medium]) -> None:
         self.objects: list[list[int]] = []
         self.balls: list[list[float]] = []
         self.materials: list[list[float]] = []
         self.rows: list[list[float]] = []
-        self.media: list[Medium] = []
+        self.media = media
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
         self.trees: list[Tree] = []
         self.nodes = self.triangles = self.normals = self.texel_count = 0
 
     def medium(self, medium: Medium) -> int:
-        if medium not in self.media:
-            self.media.append(medium)
         return self.media.index(medium)
 
     def solid(self, solid: Solid) -> None:
@@ -95,13 +97,12 @@ class _Flattener:
                         f"{surface.name}: only rectangles and disks can show a pattern, "
                         f"a {type(surface.shape).__name__} emits a constant radiance"
                     )
-                self.patterns.append(pattern_row(pattern, self.texel_count))
-                if isinstance(pattern, Picture):
-                    self.texels.append(pattern.pixels.reshape(-1, 3))
-                    self.texel_count += len(self.texels[-1])
+                self.patterns.append(self.pattern(pattern))
                 return EMISSIVE, (0, 0), len(self.patterns) - 1, [0.0] * 7
             case Diffuse(reflectance):
                 return DIFFUSE, (0, 0), -1, [*reflectance, *none, 0.0]
+            case Phong(reflectance, specular, exponent):
+                return DIFFUSE, (0, 0), -1, [*reflectance, *none, 0.0, specular, exponent]
             case Mirror(reflectance):
                 return MIRROR, (0, 0), -1, [*reflectance, *none, 0.0]
             case Translucent(color, filtered, clear):
@@ -113,6 +114,13 @@ class _Flattener:
                     raise SceneError(f"{surface.name}: a thin slab must be a rectangle or a disk")
                 media = self.medium(medium), self.medium(exterior)
                 return THIN_SLAB, media, -1, [*none, *none, thickness]
+
+    def pattern(self, pattern: Pattern) -> list[float]:
+        row = pattern_row(pattern, self.texel_count)
+        if isinstance(pattern, Picture):
+            self.texels.append(pattern.pixels.reshape(-1, 3))
+            self.texel_count += len(self.texels[-1])
+        return row
 
     def _object(
         self,
@@ -159,6 +167,32 @@ class _Flattener:
         return first_normal
 
 
+def media_of(scene: Scene) -> list[Medium]:
+    """All media of a scene, each once; the camera's first."""
+    found = [scene.around_camera, VACUUM]
+    for solid in scene.solids:
+        found += [solid.medium, solid.exterior]
+    for surface in scene.surfaces:
+        if isinstance(surface.material, ThinSlab):
+            found += [surface.material.medium, surface.material.exterior]
+    return list(dict.fromkeys(found))
+
+
+def media_table(media: list[Medium], wavelength: float) -> Floats:
+    """The one table of `Arrays` that depends on the wavelength."""
+    rows = [
+        [m.index(wavelength), *m.absorption, float(not isinstance(m.ior, float | int))]
+        for m in media
+    ]
+    return _table(rows, 5)
+
+
+def _light(light: PointLight | DirectionalLight) -> list[float]:
+    if isinstance(light, PointLight):
+        return [*light.position, *light.intensity, POINT]
+    return [*(-x for x in light.direction), *light.irradiance, DIRECTIONAL]
+
+
 def _table(rows: list[list[float]], columns: int) -> Floats:
     table = np.zeros((len(rows), columns))
     for k, row in enumerate(rows):
@@ -184,25 +218,26 @@ def flatten(scene: Scene) -> Arrays:
 
 
 def _flatten(scene: Scene) -> Arrays:
-    into = _Flattener()
-    into.medium(scene.around_camera)
-    into.medium(VACUUM)
+    media = media_of(scene)
+    into = _Flattener(media)
     for solid in scene.solids:
         into.solid(solid)
     for surface in scene.surfaces:
         into.surface(surface)
+    around = scene.background
+    background = into.pattern(around if isinstance(around, Picture) else Constant(around))
     trees = into.trees or [_NO_TREE]
     nodes = np.concatenate([tree.nodes for tree in trees])
     return Arrays(
         objects=np.array(into.objects, np.int64).reshape(-1, 8),
         balls=_table(into.balls, 4),
-        materials=_table(into.materials, 7),
+        materials=_table(into.materials, 9),
         rows=_table(into.rows, COLUMNS),
-        media=_table([[m.ior, *m.absorption] for m in into.media], 4),
+        media=media_table(media, scene.wavelength),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
-        lights=_table([[*light.position, *light.intensity] for light in scene.lights], 6),
-        background=_table([list(scene.background)], 3),
+        lights=_table([_light(light) for light in scene.lights], 7),
+        background=_table([background], 9),
         nodes=nodes,
         links=nodes.view(np.int32),
         triangles=np.concatenate([tree.triangles for tree in trees]),

@@ -1,4 +1,4 @@
-"""Point lights on diffuse surfaces, and how light is lost on straight ways."""
+"""Lights on diffuse and glossy surfaces, their shadows, and how light is lost on straight ways."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 from tracer.arrays import (
     DIELECTRIC,
+    DIRECTIONAL,
     EXTERIOR,
     MATERIAL,
     MEDIUM,
@@ -16,6 +17,8 @@ from tracer.arrays import (
 )
 from tracer.compiled import called, inlined
 from tracer.hit import hit_point, nearest_hit
+from tracer.optics import reflect
+from tracer.patterns import CONSTANT, panorama_radiance
 from tracer.shapes import vec_at
 from tracer.vector import Vec, add, dot, mul, scale, sub
 
@@ -69,29 +72,48 @@ def unshadowed(
 
 
 @called
-def lambertian(
+def lit(
     scene: Arrays,
     reflectance: Vec,
+    specular: float,
+    exponent: float,
     p: Vec,
     n: Vec,
+    wi: Vec,
     medium: int,
     hit: int,
     face: int,
     entering: bool,
     stack: Floats,
 ) -> Vec:
-    """Radiance of a diffuse surface under all lights: reflectance / pi * I cos(theta) / r^2.
+    """Radiance towards `wi` of a diffuse surface with a highlight (see `scene.Phong`).
 
     Only lights on the side from which the surface is seen count: `n` points there.
     """
-    irradiance = (0.0, 0.0, 0.0)
+    sent = (0.0, 0.0, 0.0)
     for light in range(len(scene.lights)):
-        towards = sub(vec_at(scene.lights, light, 0), p)
-        r = math.sqrt(dot(towards, towards))
-        wl = scale(1.0 / r, towards)
-        cos_theta = dot(wl, n)
+        towards, r, attenuation = vec_at(scene.lights, light, 0), math.inf, 1.0
+        if scene.lights[light, 6] != DIRECTIONAL:
+            towards = sub(towards, p)
+            r = math.sqrt(dot(towards, towards))
+            attenuation = 1.0 / (r * r)
+            towards = scale(1.0 / r, towards)
+        cos_theta = dot(towards, n)
         if cos_theta > 0.0:
-            passed = unshadowed(scene, p, wl, r, medium, hit, face, not entering, stack)
-            intensity = mul(passed, vec_at(scene.lights, light, 3))
-            irradiance = add(irradiance, scale(cos_theta / (r * r), intensity))
-    return scale(1.0 / math.pi, mul(reflectance, irradiance))
+            passed = unshadowed(scene, p, towards, r, medium, hit, face, not entering, stack)
+            looks = scale(cos_theta, reflectance)
+            cos_alpha = dot(reflect(towards, n), wi)
+            if specular > 0.0 and cos_alpha > 0.0:
+                glint = specular * cos_alpha**exponent
+                looks = add(looks, (glint, glint, glint))
+            arriving = scale(attenuation / math.pi, vec_at(scene.lights, light, 3))
+            sent = add(sent, mul(mul(passed, arriving), looks))
+    return sent
+
+
+@inlined
+def surroundings(scene: Arrays, d: Vec) -> Vec:
+    """Radiance from where nothing is, in direction `d`."""
+    if scene.background[0, 0] == CONSTANT:
+        return vec_at(scene.background, 0, 1)
+    return panorama_radiance(scene.background[0], scene.texels, d)

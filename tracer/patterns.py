@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tracer.compiled import called
 from tracer.shapes import vec_at
-from tracer.vector import Vec
+from tracer.vector import Vec, add, scale
 
 CONSTANT, CHECKER, RAMP, POSITION_CODE, PICTURE = range(5)
 AXES = {"u": 0.0, "v": 1.0}
@@ -69,6 +69,30 @@ def pattern_row(pattern: Pattern, first_texel: int) -> list[float]:
         case Picture(pixels):
             height, width, _ = pixels.shape
             return [PICTURE, first_texel, width, height]
+
+
+@called
+def panorama_radiance(row: NDArray[np.float64], texels: NDArray[np.float64], d: Vec) -> Vec:
+    """What lies in direction `d`, from a `Picture` of all around (see `scene.Scene`).
+
+    Interpolated between the centres of its texels, across the seam too.
+    """
+    width, height = int(row[2]), int(row[3])
+    x = (0.5 + math.atan2(d[0], -d[2]) / (2.0 * math.pi)) * width - 0.5
+    y = math.acos(min(max(d[1], -1.0), 1.0)) / math.pi * height - 0.5
+    y = min(max(y, 0.0), height - 1.0)
+    column, line = math.floor(x), math.floor(y)
+    fx, fy = x - column, y - line
+    first = int(row[1])
+    i, j = int(column) % width, int(line)
+    i1, j1 = (i + 1) % width, min(j + 1, height - 1)
+    seen = (0.0, 0.0, 0.0)
+    for corner in range(4):
+        right, below = corner % 2 == 1, corner >= 2
+        weight = (fx if right else 1.0 - fx) * (fy if below else 1.0 - fy)
+        at = first + (j1 if below else j) * width + (i1 if right else i)
+        seen = add(seen, scale(weight, vec_at(texels, at, 0)))
+    return seen
 
 
 @called

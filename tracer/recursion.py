@@ -1,50 +1,46 @@
-"""Images by double recursion: at every dielectric a ray becomes two.
+"""Double recursion: at every dielectric a ray becomes two.
 
 The recursion is unrolled onto an explicit stack of rays that wait. It is cut where a ray would
-have more than `max_depth` segments or carry less than `min_weight`. What is cut is added up per
-pixel: image and cut together bound what a recursion without end would show.
+have more than `max_depth` segments or carry less than `min_weight`. What is cut is added up: what
+is seen and what is cut together bound what a recursion without end would show.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.arrays import Arrays, Floats, flatten
-from tracer.camera import camera_row, pixel_centre, primary_ray
-from tracer.compiled import compiled, inlined
-from tracer.hit import NOTHING, nearest_hit, new_stack
-from tracer.light import absorbed
-from tracer.scene import Scene
+from tracer.arrays import EXTERIOR, MEDIUM, Arrays, Floats
+from tracer.compiled import inlined
+from tracer.hit import NOTHING, nearest_hit
+from tracer.light import absorbed, surroundings
 from tracer.shapes import vec_at
 from tracer.surface import BLACK, Lobes, scatter
-from tracer.threads import for_bands
 from tracer.vector import Vec, add, mul
 
 TELLING = 1e-4  # a weight whose loss would show in a picture
-BAND = 4  # rows of pixels that a thread takes at a time
-
-
-@dataclass(frozen=True, eq=False)
-class Render:
-    """`pixels` (H, W, 3) radiance, row 0 at the top; `cut` (H, W), the weight not followed.
-
-    In a world of radiance 1 without absorption, pixels + cut is 1. `closest` (H, W) is the shortest
-    way between two surfaces on any ray that carries at least `TELLING`, infinite where there is
-    none: a ray through a corner of glass, which a renderer that cannot resolve it loses.
-    """
-
-    pixels: Floats
-    cut: Floats
-    closest: Floats
 
 
 class Limits(NamedTuple):
     max_depth: int
     min_weight: float
+
+
+class Seen(NamedTuple):
+    """What a ray of the camera has seen.
+
+    `cut` is the weight that was not followed. `closest` is the shortest way between two surfaces
+    that light of at least `TELLING` took. `rays` were followed. `disperses` says that the
+    wavelength matters.
+    """
+
+    radiance: Vec
+    cut: float
+    closest: float
+    rays: int
+    disperses: bool
 
 
 class Ray(NamedTuple):
@@ -97,18 +93,22 @@ def _worth(ray: Ray, limits: Limits) -> tuple[bool, float]:
 @inlined
 def radiance(
     scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
-) -> tuple[Vec, float, float]:
-    """(radiance that arrives at `o` against `d`, weight cut, closest); starts in medium 0."""
+) -> Seen:
+    """What arrives at `o` against `d`, in medium 0."""
     seen, cut, closest, height = BLACK, 0.0, np.inf, 0
+    rays, disperses = 0, False
     ray = Ray(o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
     while True:
         hit, face, t, entering = nearest_hit(
             scene, ray.o, ray.d, ray.left, ray.left_face, ray.inward, stack
         )
+        rays += 1
         weight = mul(ray.weight, absorbed(scene.media, ray.medium, t))
         if hit == NOTHING:
-            seen = add(seen, mul(weight, vec_at(scene.background, 0, 0)))
+            seen = add(seen, mul(weight, surroundings(scene, ray.d)))
         else:
+            inside, outside = scene.objects[hit, MEDIUM], scene.objects[hit, EXTERIOR]
+            disperses |= scene.media[inside, 4] + scene.media[outside, 4] > 0.0
             if ray.segments > 1 and t < closest and max(weight[0], weight[1], weight[2]) >= TELLING:
                 closest = t
             at = scatter(scene, lobes, ray.o, t, ray.d, ray.medium, hit, face, entering, stack)
@@ -146,66 +146,6 @@ def radiance(
                 ray = reflected
                 continue
         if height == 0:
-            return seen, cut, closest
+            return Seen(seen, cut, closest, rays, disperses)
         height -= 1
         ray = _take_up(waiting, height)
-
-
-@compiled
-def _render_rows(
-    scene: Arrays,
-    limits: Limits,
-    lobes: Lobes,
-    camera: Floats,
-    begin: int,
-    end: int,
-    waiting: Waiting,
-    stack: Floats,
-    pixels: Floats,
-    cut: Floats,
-    closest: Floats,
-) -> None:
-    height, width = cut.shape
-    for j in range(begin, end):
-        for i in range(width):
-            x, y = pixel_centre(i, j, width, height)
-            o, d = primary_ray(camera, x, y)
-            seen, lost, near = radiance(scene, limits, lobes, o, d, waiting, stack)
-            for k in range(3):
-                pixels[j, i, k] = seen[k]
-            cut[j, i] = lost
-            closest[j, i] = near
-
-
-def render(scene: Scene, width: int, height: int, threads: int | None = None) -> Render:
-    """The image that the scene's camera sees through its pixels' centres.
-
-    Raises SceneError for a scene that cannot be traced. The same bits for any number of threads.
-    """
-    arrays = flatten(scene)
-    transport = scene.transport
-    limits = Limits(transport.max_depth, transport.min_weight)
-    lobes = Lobes(transport.reflection, transport.transmission, transport.radiance_n2)
-    camera = camera_row(scene.camera, width, height)
-    film = (height, width)
-    image = Render(np.empty((*film, 3)), np.empty(film), np.empty(film))
-
-    def rows(begin: int, end: int) -> None:
-        depth = transport.max_depth + 1
-        waiting = Waiting(np.empty((depth, 9)), np.empty((depth, 5), np.int64))
-        _render_rows(
-            arrays,
-            limits,
-            lobes,
-            camera,
-            begin,
-            end,
-            waiting,
-            new_stack(arrays),
-            image.pixels,
-            image.cut,
-            image.closest,
-        )
-
-    for_bands(rows, height, BAND, threads)
-    return image

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from tracer.camera import Orthographic, Perspective
+from tracer.camera import Camera
 from tracer.errors import SceneError
 from tracer.mesh import Mesh
-from tracer.patterns import Pattern
+from tracer.patterns import Pattern, Picture
 from tracer.shapes import Disk, Rectangle, Sphere
 from tracer.solids import Cell, Compound
+from tracer.spectrum import LINE_D, Dispersion
 from tracer.vector import Vec
 
 SolidShape = Sphere | Cell | Compound | Mesh
@@ -19,16 +20,25 @@ Shape = SolidShape | Rectangle | Disk
 
 @dataclass(frozen=True)
 class Medium:
-    """`ior` is the absolute index; light decays as ``exp(-absorption * length)`` per colour."""
+    """`ior` is the absolute index; light decays as ``exp(-absorption * length)`` per colour.
 
-    ior: float
+    A medium that disperses has a formula for an index, which is taken at the scene's wavelength.
+    """
+
+    ior: float | Dispersion
     absorption: Vec = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.ior < math.inf):
+        if isinstance(self.ior, float | int) and not (0.0 < self.ior < math.inf):
             raise SceneError(f"an index of refraction must be positive, not {self.ior}")
         if not all(0.0 <= a < math.inf for a in self.absorption):
             raise SceneError(f"absorption must be at least 0 and finite, not {self.absorption}")
+
+    def index(self, wavelength_nm: float) -> float:
+        """The index of refraction at a wavelength. Raises SceneError where the formula has none."""
+        if isinstance(self.ior, float | int):
+            return float(self.ior)
+        return self.ior.ior(wavelength_nm)
 
 
 VACUUM = Medium(1.0)
@@ -53,9 +63,30 @@ class Emissive:
 
 @dataclass(frozen=True)
 class Diffuse:
-    """Lambertian, lit by point lights: L = reflectance / pi * I cos(theta) / r^2."""
+    """Lambertian, lit by the scene's lights: L = reflectance / pi * E, E their irradiance."""
 
     reflectance: Vec
+
+
+@dataclass(frozen=True)
+class Phong:
+    """Lambertian with a highlight around the mirror direction of each light.
+
+    ``L = (reflectance cos(theta) + specular cos(alpha)^exponent) I / (pi r^2)`` with alpha between
+    the mirror direction and the viewer: B. T. Phong, Comm. ACM 18, 1975, in the scale of `Diffuse`.
+    The highlight has the light's colour. It is a model of looks and conserves no energy.
+    """
+
+    reflectance: Vec
+    specular: float
+    exponent: float
+
+    def __post_init__(self) -> None:
+        if not (0.0 <= self.specular < math.inf and 0.0 <= self.exponent < math.inf):
+            raise SceneError(
+                "a highlight needs a specular and an exponent of at least 0, "
+                f"not {self.specular} and {self.exponent}"
+            )
 
 
 @dataclass(frozen=True)
@@ -95,7 +126,7 @@ class ThinSlab:
             raise SceneError(f"a thin slab's thickness must be positive, not {self.thickness}")
 
 
-Material = Emissive | Diffuse | Mirror | Translucent | ThinSlab
+Material = Emissive | Diffuse | Phong | Mirror | Translucent | ThinSlab
 
 
 @dataclass(frozen=True)
@@ -113,6 +144,23 @@ class PointLight:
     def __post_init__(self) -> None:
         if not all(math.isfinite(x) for x in (*self.position, *self.intensity)):
             raise SceneError(f"a light needs finite numbers, not {self}")
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """Light from far away that travels along the unit vector `direction`.
+
+    `irradiance` is what a surface at right angles to it receives.
+    """
+
+    direction: Vec
+    irradiance: Vec
+
+    def __post_init__(self) -> None:
+        if abs(math.hypot(*self.direction) - 1.0) > 1e-9 or not all(
+            map(math.isfinite, self.irradiance)
+        ):
+            raise SceneError(f"a light needs a unit direction and finite numbers, not {self}")
 
 
 @dataclass(frozen=True)
@@ -140,10 +188,19 @@ class Transport:
 
 @dataclass(frozen=True)
 class Scene:
-    camera: Perspective | Orthographic
+    """`wavelength`, in nm, is what media that disperse are taken at.
+
+    `background` is what rays see that leave the scene: a radiance, or a picture of all around.
+
+    Such a picture is an equirectangular panorama: its middle lies along -z, +x is to the right of
+    it, and its top row is above (+y).
+    """
+
+    camera: Camera
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()
-    lights: tuple[PointLight, ...] = ()
-    background: Vec = (0.0, 0.0, 0.0)
+    lights: tuple[PointLight | DirectionalLight, ...] = ()
+    background: Vec | Picture = (0.0, 0.0, 0.0)
     around_camera: Medium = VACUUM
+    wavelength: float = LINE_D
     transport: Transport = field(default_factory=Transport)

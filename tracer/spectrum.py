@@ -1,13 +1,16 @@
 """How the index of refraction depends on the wavelength, and the glasses that we know by name.
 
-Wavelengths are in nanometres, in air. An image in colours of the spectrum is one render per
-wavelength, each with media of the index at that wavelength.
+Wavelengths are in nanometres, in air. Catalogues give the index of glass relative to air: with
+vacuum around it, light bends at such a glass as it does in a laboratory. An image in colours of
+the spectrum is one render per wavelength, each with media of the index at that wavelength.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+
+from tracer.errors import SceneError
 
 # Fraunhofer's lines, in nm, at which glass makers state indices.
 LINE_F, LINE_D, LINE_C = 486.1327, 587.5618, 656.2725
@@ -22,8 +25,10 @@ class Sellmeier:
 
     def ior(self, wavelength_nm: float) -> float:
         square = (wavelength_nm / 1000.0) ** 2
+        if any(square == c for c in self.C):
+            raise SceneError(f"{wavelength_nm} nm is where this glass absorbs: {self}")
         terms = (b * square / (square - c) for b, c in zip(self.B, self.C, strict=True))
-        return math.sqrt(1.0 + sum(terms))
+        return _index(1.0 + sum(terms), 0.5, wavelength_nm, self)
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,15 @@ class Cauchy:
 
     def ior(self, wavelength_nm: float) -> float:
         square = (wavelength_nm / 1000.0) ** 2
-        return self.A + self.B / square + self.C / (square * square)
+        return _index(
+            self.A + self.B / square + self.C / (square * square), 1.0, wavelength_nm, self
+        )
+
+
+def _index(base: float, power: float, wavelength_nm: float, formula: object) -> float:
+    if not 0.0 < base < math.inf:
+        raise SceneError(f"no index of refraction at {wavelength_nm} nm: {formula}")
+    return float(base**power)
 
 
 Dispersion = Sellmeier | Cauchy

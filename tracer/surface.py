@@ -23,7 +23,7 @@ from tracer.arrays import (
 )
 from tracer.compiled import called, inlined
 from tracer.hit import hit_point
-from tracer.light import absorbed, lambertian
+from tracer.light import absorbed, lit
 from tracer.optics import (
     cos_transmitted,
     fresnel_unpolarised,
@@ -162,11 +162,14 @@ def scatter(
     elif material == MIRROR:
         wr, reflected = reflect(wi, n), vec_at(scene.materials, hit, 0)
     elif material == DIFFUSE:
-        albedo = vec_at(scene.materials, hit, 0)
-        sent = lambertian(scene, albedo, p, geometric, medium, hit, face, entering, stack)
+        albedo, glint = vec_at(scene.materials, hit, 0), scene.materials[hit, 7]
+        exponent = scene.materials[hit, 8]
+        sent = lit(
+            scene, albedo, glint, exponent, p, geometric, wi, medium, hit, face, entering, stack
+        )
     elif material == TRANSLUCENT:
         passed, albedo = vec_at(scene.materials, hit, 0), vec_at(scene.materials, hit, 3)
-        sent = lambertian(scene, albedo, p, geometric, medium, hit, face, entering, stack)
+        sent = lit(scene, albedo, 0.0, 0.0, p, geometric, wi, medium, hit, face, entering, stack)
     else:
         crossed = 2
         transmits, R, wr, p_t, length, _ = thin_slab(scene, hit, p, d, n, entering)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from harness import expected
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
-from harness.measure.curves import curve_of_rows
+from harness.measure.light_parts import nature, worst_level
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.statistics import binned
@@ -30,30 +30,10 @@ def path_weight(
     """
     measured = pixels.reshape(-1, 3).astype(np.float64)
     true, used = _expected_level(truth, n2)
-    error = np.abs(measured - true)
-    tolerance = (quantum + truth.level_tolerance(precision) * true.max(axis=1, initial=1))[:, None]
-    tolerance = np.broadcast_to(tolerance, error.shape)
-    if not np.isfinite(error[used]).all():
-        raise Unmeasurable("a measured pixel is not finite")
-    ratio = np.where(used[:, None], error / tolerance, -np.inf)
-    k, channel = np.unravel_index(int(ratio.argmax()), ratio.shape)
-    width = truth.scene.film.width
-    detail: dict[str, float | int | str] = {
-        "max": float(error[used].max()), "rms": float(np.sqrt(np.mean(error[used] ** 2))),
-        "p999": float(np.quantile(error[used], 0.999)), "rays": int(used.sum()),
-        "excluded_grazing": int(truth.grazing.sum()), "channel": "rgb"[int(channel)],
-        "worst_pixel_x": int(k % width), "worst_pixel_y": int(k // width),
-        "worst_theta_i_deg": float(np.degrees(truth.theta_i[k])),
-    }  # fmt: skip
-    curve = curve_of_rows(
-        truth, used, "Weight of the path", "weight (green)",
-        measured[:, 1], true[:, 1], tolerance[:, 1],
-    )  # fmt: skip
-    return Comparison(
-        float(measured[k, channel]), float(true[k, channel]), float(tolerance[k, channel]),
-        bool(np.all(error[used] <= tolerance[used])),
+    tolerance = quantum + truth.level_tolerance(precision) * true.max(axis=1, initial=1)
+    return worst_level(
+        truth, measured, true, tolerance, used, nature(truth, used), "Weight of the path",
         "quantum of the image + 8 eps per rounding chain x condition of the Fresnel factors",
-        detail=detail, curve=curve,
     )  # fmt: skip
 
 
@@ -67,7 +47,9 @@ def sampled_path_weight(
     true, used = _expected_level(truth, n2)
     rows = np.flatnonzero(used)
     order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
-    return binned(pixels.reshape(-1, 3).astype(np.float64), true, order, level)
+    comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true, order, level)
+    comparison.detail.update(nature(truth, used))
+    return comparison
 
 
 def critical_angle(
@@ -152,8 +134,10 @@ def _expected_level(truth: ProbeTruth, n2: bool) -> tuple[Float, NDArray[np.bool
     landed = truth.landings[0].status == Status.HIT
     # A ray that meets fewer interfaces than the path has goes another way, and may well be lit.
     used = ~truth.grazing & (truth.paths.status != Status.MISS)
+    # Paths no longer than this one that also reach the plane would add to its light.
+    used = used & ~truth.ambiguous
     if not (used & landed).any():
-        raise Unmeasurable("no ray takes this path to the plane")
+        raise Unmeasurable("no ray takes this path alone to the plane")
     scale = np.ones(len(landed))
     if n2:
         ior = np.array([medium.ior for medium in truth.scene.media])

@@ -46,9 +46,40 @@ class Observable(enum.StrEnum):
     )
     INVERSION = "inversion", "", "magnification of the view through a lens; negative: upside down"
 
+    BREWSTER_ANGLE = "brewster_angle", "deg", "angle at which refracted and reflected are square"
+    STACK_OFFSET = "stack_offset", "units", "sideways shift of a ray through parallel layers"
+    FOLDED_DIRECTION = (
+        "folded_direction",
+        "µrad",
+        "direction of a ray out of a reflecting prism, against the one mirrored in its faces",
+    )
+    REVERSIBILITY = "reversibility", "µrad", "whether a reversed ray takes the same way back"
+    SAGITTAL_DEPTH = "sagittal_depth", "units", "apparent depth across the plane of incidence"
+    TANGENTIAL_DEPTH = "tangential_depth", "units", "apparent depth in the plane of incidence"
+    FOCUS = "focus", "units", "where rays parallel to the axis cross it"
+    FOCAL_LENGTH = "focal_length", "units", "effective focal length of rays near the axis"
+    BACK_FOCAL_LENGTH = "back_focal_length", "units", "from the last vertex to the focus"
+    SPHERICAL_ABERRATION = (
+        "spherical_aberration",
+        "units",
+        "how far from the focus the outermost ray crosses the axis",
+    )
+    APLANATIC_IMAGE = "aplanatic_image", "units", "image distance of a sphere's aplanatic point"
+    RAINBOW_ANGLE = "rainbow_angle", "deg", "angle of a rainbow from the point opposite to the sun"
+    OPTICAL_LENGTH = "optical_length", "units", "optical length of the path: sum of index x way"
+    VARIANT_AGREEMENT = (
+        "variant_agreement",
+        "units",
+        "landing points in a variant of a case against those in the case itself",
+    )
+    RAY_AGREEMENT = "ray_agreement", "units", "a ray API's landing points against coded images"
+
     # Light.
     REFLECTANCE = "reflectance", "", "reflected part of the radiance"
     TRANSMITTANCE = "transmittance", "", "transmitted part of the radiance"
+    BREWSTER_REFLECTANCE = "brewster_reflectance", "", "reflectance at Brewster's angle"
+    TOTAL_REFLECTANCE = "total_reflectance", "", "light sent back by all paths together"
+    TOTAL_TRANSMITTANCE = "total_transmittance", "", "light let through by all paths together"
     RADIANCE = "radiance", "radiance", "radiance of a pixel or a region"
 
     # Polygons in place of a smooth shape.
@@ -79,8 +110,18 @@ LIGHT_OBSERVABLES = frozenset(
         Observable.TRANSMITTANCE,
         Observable.CRITICAL_ANGLE,
         Observable.FIRST_TRANSMITTING_ANGLE,
+        Observable.BREWSTER_REFLECTANCE,
     }
 )
 
+# Observables of a probe that shows the light of all paths together.
+ALL_LIGHT_OBSERVABLES = frozenset({Observable.TOTAL_REFLECTANCE, Observable.TOTAL_TRANSMITTANCE})
+
+# Observables that only a renderer with a ray API can answer; no other one is asked.
+RAY_API_OBSERVABLES = frozenset({Observable.OPTICAL_LENGTH, Observable.RAY_AGREEMENT})
+
 # Observables of a single renderer, which have a truth; all others compare two pictures.
 TRUTH_OBSERVABLES = frozenset(Observable) - IMAGE_OBSERVABLES | {Observable.RADIANCE}
+
+# Observables that follow from others and are not asked for by name.
+IMPLIED_OBSERVABLES = frozenset({Observable.VARIANT_AGREEMENT})

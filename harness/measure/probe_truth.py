@@ -7,9 +7,9 @@ differences, so it knows curvature, grazing incidence and the neighbourhood of t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from harness.measure.precision import Precision
 from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
 from harness.scene.resolved import Rectangle, ResolvedScene
+from harness.tree import branches, natural_weight
 from harness.truth import ClosedForm, Landing, TruePaths
 
 # Step of the differences, relative to the scene's extent. Larger than any float32 renderer's own
@@ -81,14 +82,39 @@ class ProbeTruth:
         Only a renderer that cannot switch lobes off shows it, and then both codes mix: near the rim
         of a ball, for one, what is reflected goes on to the backdrop behind it.
         """
+        return self._elsewhere(partial=True)
+
+    @cached_property
+    def ambiguous_when_total(self) -> NDArray[np.bool_]:
+        """(m,) the same where a renderer reflects nothing but what is totally reflected."""
+        return self._elsewhere(partial=False)
+
+    @cached_property
+    def total(self) -> NDArray[np.bool_]:
+        """(m,) rays that are totally reflected wherever their path says R."""
+        total = np.zeros(len(self.grazing), bool)
+        for branch in branches(
+            ClosedForm(self.scene), self.rays, len(self.path) + 1, along=self.path, partial=False
+        ):
+            if branch.path == self.path:
+                total[branch.rows] = True
+        return total
+
+    def _elsewhere(self, partial: bool) -> NDArray[np.bool_]:
         exact, found = ClosedForm(self.scene), np.zeros(len(self.grazing), bool)
-        for count in range(len(self.path) + 1):
-            for letters in product("TR", repeat=count):
-                if (other := "".join(letters)) != self.path:
-                    paths = exact.follow(self.rays, other)
-                    for plane in self.planes:
-                        found |= exact.land(paths, plane).status == Status.HIT
+        for branch in branches(exact, self.rays, len(self.path) + 1, partial=partial):
+            if branch.path != self.path:
+                way = (branch.origin, branch.direction, branch.ahead)
+                for plane in self.planes:
+                    landing = exact.meet(plane, *way, branch.medium, branch.absorbed)
+                    found[branch.rows] |= landing.status == Status.HIT
         return found
+
+    @cached_property
+    def natural_level(self) -> Float:
+        """(m, 3) what the path leaves of radiance 1 in nature, where light is polarised."""
+        weight = natural_weight(ClosedForm(self.scene), self.rays, self.path)
+        return np.asarray(weight[:, None] * self.landings[0].transmission)
 
     @property
     def theta_i(self) -> Float:
@@ -146,12 +172,12 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
     level = paths.weight[:, None] * landings[0].transmission
     grazing = np.zeros(len(rays.origins), bool)
     none = np.zeros(len(grazing))
-    # Squared rates of change by cause, for the point, the direction and the level.
+    # Rates of change by cause, for point, direction and level. Shifts across the ray and tilts are
+    # components, so they add up as lengths; roundings of several indices, in full.
     rates = {cause: [none.copy() for _ in range(3)] for cause in ("origin", "direction", "index")}
-    denser = ClosedForm(_denser(scene))
-    trials = [*_shifted(rays, STEP * extent), ("index", rays, STEP)]
-    for cause, shifted, step in trials:
-        form = denser if cause == "index" else exact
+    trials = [(cause, exact, moved, step) for cause, moved, step in _shifted(rays, STEP * extent)]
+    trials += [("index", ClosedForm(denser), rays, step) for denser, step in _denser(scene)]
+    for cause, form, shifted, step in trials:
         other = form.follow(shifted, path)
         grazing |= _fate_differs(paths, other)
         worst = none
@@ -160,12 +186,15 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
             grazing |= mine.status != theirs.status
             worst = np.fmax(worst, _rate(mine.point, theirs.point, step))
         other_level = other.weight[:, None] * form.land(other, planes[0]).transmission
-        squares = rates[cause]
-        squares[0] += worst
-        squares[1] += _rate(paths.direction, other.direction, step)
-        squares[2] += _rate(level, other_level, step)
+        changes = (
+            worst,
+            _rate(paths.direction, other.direction, step),
+            _rate(level, other_level, step),
+        )
+        add = np.add if cause == "index" else np.hypot
+        rates[cause] = [add(a, b) for a, b in zip(rates[cause], changes, strict=True)]
     point, direction, weight = (
-        Condition(*(np.sqrt(rates[cause][k]) for cause in ("origin", "direction", "index")))
+        Condition(*(rates[cause][k] for cause in ("origin", "direction", "index")))
         for k in range(3)
     )
     return ProbeTruth(
@@ -173,10 +202,25 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
     )
 
 
-def _denser(scene: ResolvedScene) -> ResolvedScene:
-    """All indices but that of the surroundings larger by `STEP`, relatively."""
-    media = [m.model_copy(update={"ior": m.ior * (1 + STEP)}) for m in scene.media[1:]]
-    return scene.model_copy(update={"media": (scene.media[0], *media)})
+def _denser(scene: ResolvedScene) -> Iterator[tuple[ResolvedScene, float]]:
+    """Each index but that of the surroundings larger by `STEP`, and the step to divide by.
+
+    Where one medium lies within another, renderers may store the ratio of the two, which is rounded
+    once more; hence half the step.
+    """
+    for k, medium in enumerate(scene.media):
+        mine = [solid for solid in scene.solids if solid.medium == k]
+        if k and mine:
+            denser = medium.model_copy(update={"ior": medium.ior * (1 + STEP)})
+            media = (*scene.media[:k], denser, *scene.media[k + 1 :])
+            nested = any(solid.exterior for solid in mine) or k in {
+                s.exterior for s in scene.solids
+            }
+            yield scene.model_copy(update={"media": media}), STEP / 2 if nested else STEP
+    # The surroundings' own, where they are not 1 and so are rounded too.
+    if scene.media[0].ior != 1.0:
+        outer = scene.media[0].model_copy(update={"ior": scene.media[0].ior * (1 + STEP)})
+        yield scene.model_copy(update={"media": (outer, *scene.media[1:])}), STEP
 
 
 def _extent(scene: ResolvedScene, rays: Rays, landings: tuple[Landing, ...]) -> float:
@@ -217,6 +261,6 @@ def _fate_differs(a: TruePaths, b: TruePaths) -> NDArray[np.bool_]:
 
 
 def _rate(a: Float, b: Float, step: float) -> Float:
-    """Squared length of (b - a) / step; 0 where either is missing."""
+    """Length of (b - a) / step; 0 where either is missing."""
     change = np.linalg.norm(b - a, axis=1) / step
-    return np.asarray(np.where(np.isfinite(change), change, 0.0) ** 2)
+    return np.asarray(np.where(np.isfinite(change), change, 0.0))

@@ -15,9 +15,18 @@ from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
 from harness.measure.precision import Precision
-from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
+from harness.measure.probe_truth import ProbeTruth
+from harness.measure.ray_parts import (
+    angle_between,
+    compare_rays,
+    derivation,
+    direction_of,
+    indices,
+    lowest_of_parabola,
+    usable,
+    worst_ray,
+)
 from harness.measure.rays import RayMeasurement
-from harness.record import Curve
 from harness.renderers.base import Status
 from harness.scene.resolved import Mesh, Solid, Sphere
 from harness.truth import ClosedForm
@@ -25,14 +34,14 @@ from harness.truth import ClosedForm
 
 def exit_point(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Distance between measured and true landing point on the first plane, scene units."""
-    used, fault, counts = _used(truth, rays)
+    used, fault, counts = usable(truth, rays)
     error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1)
     tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
-    vector = (rays.point - truth.landings[0].point)[_worst(error, tolerance, used)]
+    vector = (rays.point - truth.landings[0].point)[worst_ray(error, tolerance, used)]
     detail = counts | {f"worst_d{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
-    return _comparison(
+    return compare_rays(
         truth, error, 0.0, tolerance, used, fault, detail,
-        _derivation(rays, "8 eps per rounding chain x condition of the landing point"),
+        derivation(rays, "8 eps per rounding chain x condition of the landing point"),
         curve_of_rows(
             truth, used, "Exit point", "error (units)", error, np.zeros_like(error), tolerance
         ),
@@ -41,13 +50,13 @@ def exit_point(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) ->
 
 def exit_direction(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Angle between measured and true direction after the last interface, microradians."""
-    direction = _direction(rays)
-    used, fault, counts = _used(truth, rays)
-    error = _angle(direction, truth.paths.direction) * 1e6
+    direction = direction_of(rays)
+    used, fault, counts = usable(truth, rays)
+    error = angle_between(direction, truth.paths.direction) * 1e6
     tolerance = (rays.direction_uncertainty + truth.direction_tolerance(precision)) * 1e6
-    return _comparison(
+    return compare_rays(
         truth, error, 0.0, tolerance, used, fault, counts,
-        _derivation(rays, "8 eps per rounding chain x condition of the direction"),
+        derivation(rays, "8 eps per rounding chain x condition of the direction"),
         curve_of_rows(
             truth, used, "Exit direction", "error (µrad)", error, np.zeros_like(error), tolerance
         ),
@@ -60,18 +69,18 @@ def internal_angle(truth: ProbeTruth, rays: RayMeasurement, precision: Precision
     The plane must be immersed: the ray's way from the true point of entry to its landing point is
     the way inside, which every black box shows.
     """
-    used, fault, counts = _used(truth, rays)
+    used, fault, counts = usable(truth, rays)
     n = truth.paths.n[:, 0]
     way = rays.point - truth.paths.interface[:, 0]
     length = np.linalg.norm(way, axis=1)
-    measured = _angle(way / length[:, None], -n)
-    ior_i, ior_t = _indices(truth)
+    measured = angle_between(way / length[:, None], -n)
+    ior_i, ior_t = indices(truth)
     true = expected.snell_angle(truth.theta_i, ior_i, ior_t)
     shift = rays.point_uncertainty + truth.point_tolerance(precision)
     tolerance = np.degrees(shift / length)
-    return _comparison(
+    return compare_rays(
         truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
-        _derivation(rays, "tolerance of the landing point / length of the way inside"),
+        derivation(rays, "tolerance of the landing point / length of the way inside"),
         curve_of_rows(
             truth, used, "Angle of refraction", "angle of refraction (°)",
             np.degrees(measured), np.degrees(true), tolerance,
@@ -85,46 +94,38 @@ def slab_offset(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -
     Measured against the line of the incident ray; the truth is the closed form for the slab's
     thickness, read from the distance between its faces along the normal.
     """
-    used, fault, counts = _used(truth, rays)
-    d, n = truth.rays.directions, truth.paths.n[:, 0]
-    shift = rays.point - truth.paths.interface[:, 0]
-    shift = shift - np.einsum("ij,ij->i", shift, d)[:, None] * d
-    # The shift is towards the normal's side of the undeviated ray: along -(n - (n.d) d).
-    side = -(n - np.einsum("ij,ij->i", n, d)[:, None] * d)
-    length = np.linalg.norm(side, axis=1)
-    upright = length < 1e-9
-    side = side / np.where(upright, 1.0, length)[:, None]
-    offset = np.where(upright, np.linalg.norm(shift, axis=1), np.einsum("ij,ij->i", shift, side))
+    used, fault, counts = usable(truth, rays)
+    n, offset = truth.paths.n[:, 0], sideways(truth, rays)
     inside = truth.paths.interface[:, 1] - truth.paths.interface[:, 0]
     thickness = float(np.median(np.abs(np.einsum("ij,ij->i", inside, n))[used]))
-    ior_i, ior_t = _indices(truth)
+    ior_i, ior_t = indices(truth)
     true = expected.slab_offset(truth.theta_i, thickness, ior_t / ior_i)
     tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
     worst = np.abs(offset - true)[used].max()
     counts |= {"thickness": thickness, "max_relative_to_thickness": float(worst / thickness)}
-    return _comparison(
+    return compare_rays(
         truth, offset, true, tolerance, used, fault, counts,
-        _derivation(rays, "the offset moves no more than the landing point"),
+        derivation(rays, "the offset moves no more than the landing point"),
         curve_of_rows(truth, used, "Slab offset", "offset (units)", offset, true, tolerance),
     )  # fmt: skip
 
 
 def deviation(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Deviation by a prism in its principal plane, degrees; the image's middle row lies in it."""
-    direction = _direction(rays)
-    used, fault, counts = _used(truth, rays)
+    direction = direction_of(rays)
+    used, fault, counts = usable(truth, rays)
     used = used & principal(truth)
     if not used.any():
         raise Unmeasurable("no ray of the middle row lies in the prism's principal plane")
     apex = apex_angle(truth, used)
-    ior_i, ior_t = _indices(truth)
-    measured = _angle(direction, truth.rays.directions)
+    ior_i, ior_t = indices(truth)
+    measured = angle_between(direction, truth.rays.directions)
     true = np.abs(expected.prism_deviation(signed_incidence(truth), apex, ior_t / ior_i))
     tolerance = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(precision))
     counts |= {"apex_deg": float(np.degrees(apex))}
-    return _comparison(
+    return compare_rays(
         truth, np.degrees(measured), np.degrees(true), tolerance, used, fault, counts,
-        _derivation(rays, "tolerance of the exit direction"),
+        derivation(rays, "tolerance of the exit direction"),
         curve_of_rows(
             truth, used, "Deviation", "deviation (°)",
             np.degrees(measured), np.degrees(true), tolerance,
@@ -138,18 +139,21 @@ def minimum_deviation(truth: ProbeTruth, rays: RayMeasurement, precision: Precis
     The same estimate on the true curve at the same angles tells the estimate's own error, which is
     taken off.
     """
-    direction = _direction(rays)
-    used, fault, counts = _used(truth, rays)
+    direction = direction_of(rays)
+    used, fault, counts = usable(truth, rays)
     used = used & principal(truth)
     if used.sum() < 7:
         raise Unmeasurable("fewer than 7 rays lie in the prism's principal plane")
     apex = apex_angle(truth, used)
-    ior_i, ior_t = _indices(truth)
+    ior_i, ior_t = indices(truth)
     theta = signed_incidence(truth)[used]
     true_curve = expected.prism_deviation(theta, apex, ior_t / ior_i)
     closed = np.degrees(expected.prism_minimum_deviation(apex, ior_t / ior_i))
-    bias = _vertex(theta, np.degrees(true_curve)) - closed
-    value = _vertex(theta, np.degrees(_angle(direction, truth.rays.directions)[used])) - bias
+    bias = lowest_of_parabola(theta, np.degrees(true_curve)) - closed
+    value = (
+        lowest_of_parabola(theta, np.degrees(angle_between(direction, truth.rays.directions)[used]))
+        - bias
+    )
     bound = np.degrees(rays.direction_uncertainty + truth.direction_tolerance(precision))[used]
     tolerance = 3 * float(bound[np.argsort(np.abs(true_curve - true_curve.min()))[:7]].max())
     return Comparison(
@@ -195,7 +199,7 @@ def inversion(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> 
     How fast the landing point climbs with the pixel in the middle of the image, relative to the
     view without glass. The truth is the closed form of the same rays, put through the same fit.
     """
-    used, fault, counts = _used(truth, rays)
+    used, fault, counts = usable(truth, rays)
     film = truth.scene.film
     column = np.arange(film.width * film.height) % film.width == film.width // 2
     row = np.arange(film.width * film.height) // film.width
@@ -226,15 +230,15 @@ def tessellation_error(truth: ProbeTruth, rays: RayMeasurement, precision: Preci
 
     The truth of the polygons themselves is in closed form too, so the value to expect is known.
     """
-    direction = _direction(rays)
-    used, fault, counts = _used(truth, rays)
+    direction = direction_of(rays)
+    used, fault, counts = usable(truth, rays)
     sphere = _circumscribed(truth.scene.solids[0])
     ball = ClosedForm(truth.scene.model_copy(update={"solids": (sphere,)}))
     smooth = ball.follow(truth.rays, truth.path)
     used = used & (smooth.status == Status.HIT)
 
     def rms(d: Float) -> float:
-        return float(np.sqrt(np.mean(_angle(d[used], smooth.direction[used]) ** 2)) * 1e6)
+        return float(np.sqrt(np.mean(angle_between(d[used], smooth.direction[used]) ** 2)) * 1e6)
 
     value, true = rms(direction), rms(truth.paths.direction)
     bound = (rays.direction_uncertainty + truth.direction_tolerance(precision))[used]
@@ -261,6 +265,20 @@ def _circumscribed(solid: Solid) -> Solid:
     return solid.model_copy(update={"shape": sphere})
 
 
+def sideways(truth: ProbeTruth, rays: RayMeasurement) -> Float:
+    """(m,) how far rays run beside their undeviated line, positive as glass shifts them."""
+    d, n = truth.rays.directions, truth.paths.n[:, 0]
+    shift = rays.point - truth.paths.interface[:, 0]
+    shift = shift - np.einsum("ij,ij->i", shift, d)[:, None] * d
+    # The shift is towards the normal's side of the undeviated ray: along -(n - (n.d) d).
+    side = -(n - np.einsum("ij,ij->i", n, d)[:, None] * d)
+    length = np.linalg.norm(side, axis=1)
+    upright = length < 1e-9
+    side = side / np.where(upright, 1.0, length)[:, None]
+    along = np.einsum("ij,ij->i", shift, side)
+    return np.asarray(np.where(upright, np.linalg.norm(shift, axis=1), along))
+
+
 # --- geometry of a prism --------------------------------------------------------------------------
 
 
@@ -277,7 +295,7 @@ def principal(truth: ProbeTruth) -> NDArray[np.bool_]:
 def apex_angle(truth: ProbeTruth, used: NDArray[np.bool_]) -> float:
     """Angle between the faces where the rays enter and leave, radians."""
     n1, n2 = truth.paths.n[used, 0], truth.paths.n[used, -1]
-    return float(np.median(_angle(n1, n2)))
+    return float(np.median(angle_between(n1, n2)))
 
 
 def signed_incidence(truth: ProbeTruth) -> Float:
@@ -286,113 +304,3 @@ def signed_incidence(truth: ProbeTruth) -> Float:
     edge = np.cross(n1, n2)
     sense = np.einsum("ij,ij->i", np.cross(truth.rays.directions, n1), edge)
     return np.asarray(np.where(sense > 0, 1.0, -1.0) * truth.theta_i)
-
-
-# --- shared ---------------------------------------------------------------------------------------
-
-
-def _used(
-    truth: ProbeTruth, rays: RayMeasurement
-) -> tuple[NDArray[np.bool_], str, dict[str, float | int | str]]:
-    """The rays that count, what is wrong with the others, and how many there are of each."""
-    landed = np.all([landing.status == Status.HIT for landing in truth.landings], axis=0)
-    # A ray that meets fewer interfaces than the path has goes another way, and may well be seen.
-    elsewhere = truth.paths.status == Status.MISS
-    nowhere = ~elsewhere & np.all([x.status != Status.HIT for x in truth.landings], axis=0)
-    clear = ~truth.grazing & ~rays.mixed
-    owed = landed & clear & ~rays.faint
-    lost = owed & ~rays.seen
-    ghosts = nowhere & clear & (rays.seen | rays.undecided)
-    faults = []
-    if lost.any():
-        faults.append(f"{int(lost.sum())} of {int(owed.sum())} rays did not arrive")
-    if ghosts.any():
-        faults.append(f"{int(ghosts.sum())} pixels are lit that no ray should reach")
-    used = landed & clear & rays.seen
-    if not used.any():
-        raise Unmeasurable(
-            "no ray could be measured: " + ("; ".join(faults) or f"pixels: {rays.reasons}")
-        )
-    counts: dict[str, float | int | str] = {
-        "rays": int(used.sum()),
-        "lost": int(lost.sum()),
-        "ghosts": int(ghosts.sum()),
-        "excluded_grazing": int((landed & truth.grazing).sum()),
-        "excluded_mixed": int((landed & rays.mixed).sum()),
-        "excluded_faint": int((landed & rays.faint & ~rays.seen).sum()),
-        "method": rays.method,
-    }
-    return used, "; ".join(faults), counts
-
-
-def _direction(rays: RayMeasurement) -> Float:
-    if rays.direction is None:
-        raise Unmeasurable("one plane does not tell a direction; the probe needs two")
-    return rays.direction
-
-
-def _indices(truth: ProbeTruth) -> tuple[float, float]:
-    """Indices before and after the first interface."""
-    media, scene = truth.scene.media, truth.scene
-    solid = scene.solids[0]
-    inside = scene.camera.medium == solid.medium
-    beyond = solid.exterior if inside else solid.medium
-    return media[scene.camera.medium].ior, media[beyond].ior
-
-
-def _angle(a: Float, b: Float) -> Float:
-    """atan2(|a x b|, a . b): exact for small angles, where acos is not."""
-    return np.asarray(
-        np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
-    )
-
-
-def _worst(error: Float, tolerance: Float, used: NDArray[np.bool_]) -> int:
-    """The ray nearest to, or furthest beyond, its limit."""
-    ratio = np.where(used, error / tolerance, -np.inf)
-    return int(np.argmax(ratio))
-
-
-def _vertex(x: Float, y: Float) -> float:
-    """Minimum of the parabola fitted to the seven lowest samples."""
-    low = np.argsort(y)[:7]
-    center = x[low].mean()
-    a, b, c = np.polyfit(x[low] - center, y[low], 2)
-    return float(c - b * b / (4 * a))
-
-
-def _derivation(rays: RayMeasurement, arithmetic: str) -> str:
-    return f"quantum of the image through the {rays.method} + {arithmetic} ({ROUNDINGS} roundings)"
-
-
-def _comparison(
-    truth: ProbeTruth,
-    value: Float,
-    true: Float | float,
-    tolerance: Float,
-    used: NDArray[np.bool_],
-    fault: str,
-    detail: dict[str, float | int | str],
-    derivation: str,
-    curve: Curve,
-) -> Comparison:
-    wanted = np.broadcast_to(true, value.shape)
-    error = np.abs(value - wanted)
-    if not np.isfinite(error[used]).all() or not np.isfinite(tolerance[used]).all():
-        raise Unmeasurable("a measured ray or its tolerance is not finite")
-    k = _worst(error, tolerance, used)
-    width = truth.scene.film.width
-    detail = {
-        "max": float(error[used].max()),
-        "rms": float(np.sqrt(np.mean(error[used] ** 2))),
-        "p999": float(np.quantile(error[used], 0.999)),
-        "worst_pixel_x": int(k % width),
-        "worst_pixel_y": int(k // width),
-        "worst_theta_i_deg": float(np.degrees(truth.theta_i[k])),
-        **detail,
-    }
-    within = bool(np.all(error[used] <= tolerance[used])) and not fault
-    return Comparison(
-        float(value[k]), float(wanted[k]), float(tolerance[k]), within, derivation, fault,
-        detail, curve,
-    )  # fmt: skip

@@ -28,7 +28,8 @@ class RayMeasurement:
     `seen` (m,) tells that the ray reached the plane; `undecided` (m,) that a pixel held light which
     does not decode. `faint` (m,) marks rays whose light is too weak to be demanded. The
     uncertainties (m,) are what the image's quantum alone allows: units and radians. `reflected`
-    (m,) is what a ray API says of total internal reflection; images only show darkness.
+    (m,) is what a ray API says of total internal reflection; images only show darkness. So is
+    `optical_length` (m,) up to the landing point.
     """
 
     point: Float
@@ -42,6 +43,7 @@ class RayMeasurement:
     reasons: dict[str, int]
     method: str
     reflected: NDArray[np.bool_] | None = None
+    optical_length: Float | None = None
 
 
 def from_paths(paths: RayPaths) -> RayMeasurement:
@@ -57,6 +59,7 @@ def from_paths(paths: RayPaths) -> RayMeasurement:
     return RayMeasurement(
         np.where(missing, np.nan, paths.point), np.where(missing, np.nan, paths.direction),
         seen, nothing, nothing, nothing, none, none, names, "ray API", paths.status == Status.TIR,
+        paths.optical_length,
     )  # fmt: skip
 
 

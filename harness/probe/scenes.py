@@ -21,18 +21,28 @@ from harness.scene.resolved import (
 # Below 1, so that no rounding upwards can clip.
 AMPLITUDE = 0.9
 AXES = ("u", "v")
+BOTH_LOBES = {"reflection": True, "transmission": True}
 
 
 def code_scene(
-    scene: ResolvedScene, plane: Rectangle, axis: str, cells: int, path: str
+    scene: ResolvedScene,
+    plane: Rectangle,
+    axis: str,
+    cells: int,
+    path: str,
+    total_reflection: bool = False,
 ) -> ResolvedScene:
     """`scene` with nothing luminous but a position code along `axis` of `plane`.
 
     Lobes that the path does not take are switched off where a renderer can: the weight does not
-    matter, because the code's constant channel divides it out.
+    matter, because the code's constant channel divides it out. Total reflection is always followed,
+    so paths of `total_reflection` do not need the partial one.
     """
     pattern = PositionCode.model_validate({"axis": axis, "cells": cells, "amplitude": AMPLITUDE})
-    transport = {"reflection": "R" in path, "transmission": "T" in path or not path}
+    transport = {
+        "reflection": "R" in path and not total_reflection,
+        "transmission": "T" in path or not path,
+    }
     return _isolated(scene, plane, Emissive(pattern=pattern), path, transport)
 
 
@@ -42,9 +52,13 @@ def light_scene(scene: ResolvedScene, plane: Rectangle, path: str) -> ResolvedSc
     Both lobes are followed, so that each carries its own Fresnel factor; the depth cuts the rest.
     """
     pattern = Constant(radiance=(1.0, 1.0, 1.0))
-    return _isolated(
-        scene, plane, Emissive(pattern=pattern), path, {"reflection": True, "transmission": True}
-    )
+    return _isolated(scene, plane, Emissive(pattern=pattern), path, BOTH_LOBES)
+
+
+def all_light_scene(scene: ResolvedScene, plane: Rectangle) -> ResolvedScene:
+    """The same with all paths that the scene's own transport allows."""
+    shown = light_scene(scene, plane, "")
+    return shown.model_copy(update={"transport": scene.transport})
 
 
 def _isolated(

@@ -10,6 +10,7 @@ from harness.report.quantity import SUPERSCRIPT, number
 
 TICK_ROOM = 13.0  # pixels
 LARGEST = 1e300  # beyond it, differences of values overflow
+SMALLEST = 1e-300  # below it, steps between ticks vanish
 
 
 def drawable(value: float) -> bool:
@@ -101,5 +102,7 @@ def for_residuals(residuals: Sequence[float], band: float, start: float, end: fl
     largest = max((abs(v) for v in residuals), default=0.0)
     if 4 * band < largest < 1e30 * band:
         return Axis(-1.5 * largest, 1.5 * largest, start, end, linear_to=band)
-    high = max(1.1 * largest, 1.4 * band) or 1.0
+    high = max(1.1 * largest, 1.4 * band)
+    if high < SMALLEST:
+        high = 1.0
     return Axis(-high, high, start, end)

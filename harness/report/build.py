@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING
 from harness import record as records
 from harness.errors import InputError
 from harness.record import CaseRecord, Summary, SummaryCase, Verdict
-from harness.report import chart, mathml, overview, quantity, view
+from harness.report import changes, chart, mathml, overview, quantity, view
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
 from harness.report.links import RunFolder, clean, page_name, url
+from harness.report.pagedata import case_data
+from harness.report.trends import Trends
 
 if TYPE_CHECKING:
     import jinja2
@@ -52,6 +54,7 @@ class Neighbours:
 
     previous: tuple[str, str] | None  # (link, name)
     following: tuple[str, str] | None
+    failing: tuple[str, str] | None  # the next one that fails
     position: int
     total: int
 
@@ -65,6 +68,7 @@ class _Report:
         self.order = view.case_order(summary)
         self.renderers = view.renderer_names(summary)
         self.colours = colour_classes(self.renderers)
+        self.trends = Trends(self.renderers, self.colours)
         self.stray: list[str] = []  # record files that belong to no case of the summary
         self.environment = _environment()
         self.environment.globals.update(
@@ -93,6 +97,8 @@ class _Report:
                 continue
             records.write_text(self._page_path(case), self.case(record, path))
             rows[case.id] = self._row(case, record, "")
+            for curve in record.curves:
+                self.trends.add(curve)
         missing = "no readable record of this case"
         if problems:
             missing += " (unreadable: " + "; ".join(problems[:3]) + ")"
@@ -124,13 +130,17 @@ class _Report:
         ]
         charts = [chart.draw(curve, self.colours) for curve in record.curves]
         name, parameters = view.split_id(record.id)
+        checks = view.sorted_views(record.checks)
         return self.environment.get_template("case.html.j2").render(
             record=record,
             name=name,
             id_parameters=parameters,
             headings=_parameters(record),
             formula=mathml.typeset(record.formula),
-            checks=view.sorted_views(record.checks),
+            checks=checks,
+            change_of=changes.change,
+            diagnoses=overview.ranked(record.diagnoses, record.checks),
+            worst_of={v.check.renderer: v for v in reversed(checks)},
             runs=runs,
             pictured=any(images for _, _, images in runs),
             coarse=all(i.width < COARSE for run in record.runs for i in run.images),
@@ -139,6 +149,7 @@ class _Report:
             record_href=folder.href(f"records/{path.name}"),
             files=_files(record, folder),
             neighbours=self._neighbours(record.id),
+            data=case_data(record, folder, self.colours, charts),
         )
 
     def _neighbours(self, case_id: str) -> Neighbours:
@@ -148,7 +159,10 @@ class _Report:
         def link(k: int) -> tuple[str, str] | None:
             return (url(page_name(ids[k])), clean(ids[k])) if 0 <= k < len(ids) else None
 
-        return Neighbours(link(at - 1), link(at + 1), at + 1, len(ids))
+        bad = (Verdict.FAIL, Verdict.ERROR)
+        after = range(at + 1, len(ids))
+        failing = next((k for k in after if self.order[k].status in bad), -1)
+        return Neighbours(link(at - 1), link(at + 1), link(failing), at + 1, len(ids))
 
     def index(self, rows: list[view.Row]) -> str:
         families = sorted({row.family for row in rows})
@@ -167,8 +181,23 @@ class _Report:
             exit_meaning=overview.EXIT_CODES.get(self.summary.exit_code, "unknown"),
             stray=self.stray,
             verdicts=[verdict.value for verdict in Verdict],
+            diagnoses=overview.ranked(
+                self.summary.diagnoses, (c for case in self.summary.cases for c in case.checks)
+            ),
+            changed=changes.panel(self.summary.baseline),
+            changes=_change_chips(rows),
+            failures=overview.failures(self.summary),
+            pages={row.id: row.page for row in rows},
+            trends=self.trends.panels(self.summary),
             worst_page=_page_of(rows, verdict.worst_case),
         )
+
+
+def _change_chips(rows: list[view.Row]) -> list[tuple[str, str, str]]:
+    """(state, tone, word) of each state that cases are in, where there is more than one."""
+    states = {row.change.state: row.change for row in rows if row.change}
+    known = [states[state.value] for state in changes.ORDER if state.value in states]
+    return [(c.state, c.tone, c.text) for c in known] if len(known) > 1 else []
 
 
 def _page_of(rows: list[view.Row], case_id: str) -> str | None:

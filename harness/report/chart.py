@@ -57,6 +57,7 @@ class Chart:
     legend: list[Entry]
     residual_label: str
     bent: bool  # the residuals' axis is logarithmic beyond the band
+    x_axis: Axis
 
 
 def draw(curve: Curve, colours: Mapping[str, str]) -> Chart:
@@ -76,7 +77,7 @@ def draw(curve: Curve, colours: Mapping[str, str]) -> Chart:
         '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}">\n{}\n</svg>'
     ).format(WIDTH, bottom + 44, label, Markup("\n").join(parts))
     legend = [_entry(s, curve, colours) for s in curve.series]
-    return Chart(clean(curve.title), svg, legend, clean(curve.residual_label), bent)
+    return Chart(clean(curve.title), svg, legend, clean(curve.residual_label), bent, x_axis)
 
 
 def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup | None:
@@ -84,7 +85,7 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
     residual = next((s for s in curve.residuals if s.renderer == renderer and s.x), None)
     if residual is None:
         return None
-    width, height = 84, 48
+    width, height = 96, 60
     xs = [x for x in residual.x if drawable(x)]
     x_axis = spanning(xs or [0.0, 1.0], 1, width - 1, 0.0)
     band = max((t for t in curve.tolerance if drawable(t)), default=0.0)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from harness.record import Summary, Verdict
+from harness.record import Check, Diagnosis, Summary, Verdict
 from harness.report.links import clean
 from harness.report.quantity import count, number
 from harness.report.view import CheckView, Row, check_view
@@ -59,6 +59,47 @@ def headline(summary: Summary) -> Headline:
         _, case_id, view = min(good, key=lambda item: item[0])
         return Headline(state, text, also, "Closest to its limit:", view, case_id)
     return Headline(state, text, also)
+
+
+MOST_FAILURES = 6
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A check that fails, where it stands and how many more of its renderer and kind there are."""
+
+    case: str
+    view: CheckView
+    more: int
+
+
+def failures(summary: Summary) -> tuple[list[Failure], int]:
+    """The worst check of each renderer and observable that fails, and how many kinds are left out.
+
+    One fault of a renderer fails many checks; each kind of failure is listed once.
+    """
+    kinds: dict[tuple[str, str], list[tuple[tuple[int, float], str, CheckView]]] = {}
+    for case in summary.cases:
+        for check in case.checks:
+            if check.status in (Verdict.FAIL, Verdict.ERROR):
+                view = check_view(check)
+                order = (int(check.status != Verdict.FAIL), view.rank[1])
+                kinds.setdefault((check.renderer, check.observable), []).append(
+                    (order, case.id, view)
+                )
+    worst = sorted(
+        ((min(found, key=lambda f: f[0]), len(found) - 1) for found in kinds.values()),
+        key=lambda item: item[0][0],
+    )
+    shown = [Failure(clean(case), view, more) for (_, case, view), more in worst[:MOST_FAILURES]]
+    return shown, max(0, len(worst) - MOST_FAILURES)
+
+
+def ranked(diagnoses: Sequence[Diagnosis], checks: Iterable[Check]) -> list[tuple[str, Diagnosis]]:
+    """Diagnoses with the verdict whose colour they bear: of renderers that fail before the rest."""
+    failing = {c.renderer for c in checks if c.status in (Verdict.FAIL, Verdict.ERROR)}
+    toned = [("fail" if d.renderer in failing else "known", d) for d in diagnoses]
+    return sorted(toned, key=lambda item: item[0] != "fail")
 
 
 def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:

@@ -6,6 +6,7 @@ failures and draws the bars.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from harness.record import (
     SEVERITY,
     CaseRecord,
     Check,
+    Curve,
     DifferenceMap,
     ImageFile,
     RendererRun,
@@ -24,6 +26,7 @@ from harness.record import (
     Verdict,
     worst,
 )
+from harness.report.changes import Change, change
 from harness.report.chart import sparkline
 from harness.report.links import RunFolder, clean
 from harness.report.quantity import number, share, with_unit
@@ -196,11 +199,23 @@ class Cell:
     bad: int
     reason: str
     picture: Picture | None
-    spark: Markup | None  # the residuals of the first curve
+    change: Change | None
+    stored: bool  # an approved result stands in for the renderer
+
+
+@dataclass(frozen=True)
+class Worst:
+    """The picture of a case's worst: a map of differences, or else residuals of a curve."""
+
+    href: str | None
+    spark: Markup | None
+    text: str  # whose
 
 
 @dataclass(frozen=True)
 class Row:
+    """`sort` holds what columns are sorted by: error over tolerance of the case and by column."""
+
     id: str
     name: str
     parameters: list[tuple[str, str]]
@@ -210,6 +225,10 @@ class Row:
     note: str  # why there is no page or no record
     page: str | None
     cells: list[Cell]
+    worst: Worst | None
+    sort: str
+    change: Change | None
+    diagnoses: list[tuple[str, str]]  # (renderer, sentence)
 
 
 def split_id(case_id: str) -> tuple[str, list[tuple[str, str]]]:
@@ -234,6 +253,7 @@ def row(
     runs = {run.name: run for run in record.runs} if record else {}
     curve = record.curves[0] if record and record.curves else None
     name, parameters = split_id(case.id)
+    cells = [_cell(renderer, case.checks, runs.get(renderer), folder) for renderer in renderers]
     return Row(
         id=clean(case.id),
         name=name,
@@ -243,17 +263,55 @@ def row(
         status=case.status,
         note=note,
         page=page,
-        cells=[
-            _cell(
-                renderer,
-                case.checks,
-                runs.get(renderer),
-                folder,
-                spark=sparkline(curve, renderer, colours) if curve else None,
-            )
-            for renderer in renderers
-        ],
+        cells=cells,
+        worst=_worst(record, curve, cells, colours, folder) if record else None,
+        sort=_sort_keys(case, cells),
+        change=change(case.checks),
+        diagnoses=[(d.renderer, clean(d.sentence)) for d in case.diagnoses],
     )
+
+
+def _sort_keys(case: SummaryCase, cells: Sequence[Cell]) -> str:
+    """JSON: the verdict's place, and how much of its tolerance the worst check uses."""
+    ratios = [_sortable(cell.main.ratio) if cell.main else -1.0 for cell in cells]
+    keys = {"status": SEVERITY.index(case.status), "worst": max(ratios, default=-1.0)}
+    return json.dumps(keys | {f"r{k}": ratio for k, ratio in enumerate(ratios)})
+
+
+def _sortable(ratio: float | None) -> float:
+    """Unknown below everything, NaN and infinity above."""
+    if ratio is None:
+        return -1.0
+    return float(f"{ratio:.4g}") if ratio < 1e30 else 1e30
+
+
+def _worst(
+    record: CaseRecord,
+    curve: Curve | None,
+    cells: Sequence[Cell],
+    colours: Mapping[str, str],
+    folder: RunFolder,
+) -> Worst | None:
+    if record.differences:
+        pairs = {frozenset((m.a, m.b)): m for m in record.differences}
+        between = [
+            check for check in record.checks if frozenset((check.renderer, check.against)) in pairs
+        ]
+        views = sorted_views(between)
+        first = (
+            pairs[frozenset((views[0].check.renderer, views[0].check.against))]
+            if views
+            else record.differences[0]
+        )
+        return Worst(folder.href(first.path), None, f"{clean(first.a)} − {clean(first.b)}")
+    if curve is None:
+        return None
+    known = [cell for cell in cells if cell.main]
+    named = [s.renderer for s in curve.residuals]
+    ordered = sorted(known, key=lambda cell: cell.main.rank if cell.main else (9, 0.0))
+    renderer = next((cell.renderer for cell in ordered if cell.renderer in named), None)
+    spark = sparkline(curve, renderer, colours) if renderer else None
+    return Worst(None, spark, f"residuals of {clean(renderer or '')}") if spark else None
 
 
 def _cell(
@@ -261,8 +319,6 @@ def _cell(
     checks: Iterable[Check],
     run: RendererRun | None,
     folder: RunFolder,
-    *,
-    spark: Markup | None,
 ) -> Cell:
     views = sorted_views(check for check in checks if check.renderer == renderer)
     shown = main_picture(run.images, folder) if run else None
@@ -279,7 +335,8 @@ def _cell(
         bad=sum(view.check.status in (Verdict.FAIL, Verdict.ERROR) for view in views),
         reason=reason,
         picture=shown,
-        spark=spark,
+        change=change(view.check for view in views),
+        stored=run is not None and run.stored is not None,
     )
 
 

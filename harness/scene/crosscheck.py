@@ -11,7 +11,9 @@ from functools import cache
 
 from harness.errors import nearest
 from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
     IMAGE_OBSERVABLES,
+    IMPLIED_OBSERVABLES,
     LIGHT_OBSERVABLES,
     TRUTH_OBSERVABLES,
     Observable,
@@ -21,7 +23,7 @@ from harness.scene.findings import Finding, KeyPath, quoted
 
 AIR = "air"  # what surrounds everything; a scene may define it otherwise
 AGAINST = frozenset({"truth", "renderers"})
-OBSERVABLES = frozenset(observable.value for observable in Observable)
+OBSERVABLES = frozenset(o.value for o in Observable if o not in IMPLIED_OBSERVABLES)
 BUILT_IN = frozenset({"tracer", "povray", "mitsuba", "mitsuba-exact"})
 
 MOST_NAMES = 30  # that a message lists
@@ -42,6 +44,7 @@ def cross_findings(document: Table, renderers: Collection[str] = ()) -> list[Fin
     return [
         *_repeated_names(document),
         *_media(document),
+        *_variants(document),
         *_checks(document, registered_renderers().union(renderers)),
     ]
 
@@ -76,7 +79,7 @@ def _reference(path: KeyPath, name: str | None, known: Collection[str] | None) -
 
 
 def _repeated_names(document: Table) -> Iterator[Finding]:
-    for group in ("solids", "surfaces", "probes"):
+    for group in ("solids", "surfaces", "probes", "variants"):
         seen: set[str] = set()
         for index, row in _rows(document, group):
             name = _text(row, "name")
@@ -95,6 +98,14 @@ def _media(document: Table) -> Iterator[Finding]:
         yield from _reference(path, _text(material, "medium"), known)
     camera = _table(document, "camera")
     yield from _reference(("camera", "medium"), _text(camera, "medium"), known)
+
+
+def _variants(document: Table) -> Iterator[Finding]:
+    names = {_text(row, "name") for _, row in _rows(document, "solids")}
+    known = None if None in names else {name for name in names if name}
+    for index, variant in _rows(document, "variants"):
+        for solid in _table(variant, "shapes"):
+            yield from _reference(("variants", index, "solid"), solid, known)
 
 
 def _checks(document: Table, renderers: frozenset[str]) -> Iterator[Finding]:
@@ -145,11 +156,18 @@ def _probe(
         expected = ", ".join(sorted(probes or ())) or "a probe that the scene defines"
         yield Finding(where, "missing", None, expected)
         return
-    measure = "light" if observable in LIGHT_OBSERVABLES else "position"
+    measure = measure_of(observable)
     probe = probes.get(name) if probes is not None and isinstance(name, str) else None
     if probe is not None and probe.get("measure", "position") != measure:
         expected = f'a probe with measure = "{measure}"'
         yield Finding(where, f"{observable} needs another probe", quoted(name), expected)
+
+
+def measure_of(observable: Observable) -> str:
+    """What a probe must measure for `observable`."""
+    if observable in ALL_LIGHT_OBSERVABLES:
+        return "all-light"
+    return "light" if observable in LIGHT_OBSERVABLES else "position"
 
 
 def _known(deviation: Table, path: KeyPath, renderers: Collection[str]) -> Iterator[Finding]:

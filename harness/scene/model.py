@@ -174,7 +174,10 @@ class Probe(Strict):
     `path` has a letter per interface: T transmit, R reflect. `planes` are the backdrops on which
     rays are caught, each in a render of its own. With `measure` "position" they carry position
     codes of at most `cells` cells, and two of them give the direction; with "light" the first one
-    has radiance 1, so that a pixel shows the weight of the path.
+    has radiance 1, so that a pixel shows the weight of the path. With "all-light" it shows the
+    light of all paths together that the scene's transport allows; `path` is the shortest of them.
+    `total_reflection` says that all R of the path are total, so that a renderer that can switch
+    partial reflection off shows this path alone.
     """
 
     name: Name
@@ -182,8 +185,21 @@ class Probe(Strict):
         str, Field(pattern=r"^[TR]*$", max_length=64, description="letters T and R, as in TRT")
     ]
     planes: Annotated[tuple[Rectangle, ...], Field(min_length=1, max_length=2)]
-    measure: Literal["position", "light"] = "position"
+    measure: Literal["position", "light", "all-light"] = "position"
+    total_reflection: bool = False
     cells: Annotated[int, Field(ge=1, le=16383)] = 4095
+
+
+class Variant(Placed):
+    """The same case in another form, of which every probe must show the same.
+
+    `shapes` replaces those of the solids it names; then everything, camera and planes too, is
+    turned by `rotate` about the origin and made `scale` times as large.
+    """
+
+    name: Name
+    shapes: dict[Name, SolidShape] = Field(default_factory=dict)
+    scale: Positive = 1.0
 
 
 # --- checks ---------------------------------------------------------------------------------------
@@ -193,12 +209,15 @@ class Known(Strict):
     """A documented deviation of a renderer: KNOWN while its size stays in [at_least, at_most].
 
     When it is gone the check fails, because the scene is out of date; `at_least` 0 says that it
-    shows in some permutations only.
+    shows in some permutations only. `astray` is how many rays may be lost by it, or come where none
+    should. With `variants` it is about these alone; sizes are those in the case's own units.
     """
 
     renderer: str
     at_least: Finite
     at_most: Finite
+    astray: Annotated[int, Field(ge=0)] = 0
+    variants: tuple[Name, ...] = ()
     cause: Annotated[str, Field(min_length=10)]
 
 
@@ -246,5 +265,6 @@ class Case(Strict):
     lights: tuple[PointLight, ...] = ()
     transport: Transport = Transport()
     probes: tuple[Probe, ...] = ()
+    variants: tuple[Variant, ...] = ()
     checks: Annotated[tuple[CheckSpec, ...], Field(min_length=1)]
     tables: tuple[Table, ...] = ()

@@ -14,10 +14,21 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from harness.chord import Body, Chord
+from harness.chord import Body
 from harness.expected import Float
+from harness.intervals import Chord
 from harness.scene.model import Icosphere
-from harness.scene.resolved import Convex, Cylinder, Frame, Mesh, Solid, SolidShape, Sphere
+from harness.scene.resolved import (
+    Cone,
+    Convex,
+    Cylinder,
+    Frame,
+    Lens,
+    Mesh,
+    Solid,
+    SolidShape,
+    Sphere,
+)
 from harness.scene.shapes import solid_shape
 from tests.catalogue import EPS
 
@@ -118,7 +129,7 @@ def test_sphere(
 ) -> None:
     sphere = Sphere(center=center, radius=radius)
     origin, direction = line(o, d)
-    chord = body(sphere).chord(origin[None], direction[None])
+    chord = body(sphere).chords(origin[None], direction[None])[0]
     closest = np.cross(np.array(center) - origin, direction)
     assume(abs(np.linalg.norm(closest) - radius) > 1e-6)  # nor does it graze
     assert (chord.t_in[0] < chord.t_out[0]) == (np.linalg.norm(closest) < radius)
@@ -134,7 +145,7 @@ def test_box(
 ) -> None:
     middle, size = np.array(center), np.array(half)
     origin, direction = line(o, d)
-    chord = body(box(middle, size)).chord(origin[None], direction[None])
+    chord = body(box(middle, size)).chords(origin[None], direction[None])[0]
     assert_chord_of(box_function(middle, size), chord, origin, direction)
 
 
@@ -151,7 +162,7 @@ def test_cylinder(
     origin, direction = line(o, d)
     across = np.linalg.norm(np.cross(direction, cylinder.frame.z))
     assume(across == 0 or across > 1e-3)  # nearly along the axis the side's roots cancel
-    chord = body(cylinder).chord(origin[None], direction[None])
+    chord = body(cylinder).chords(origin[None], direction[None])[0]
     away = np.cross(direction, np.array(cylinder.frame.z))
     if across:
         gap = abs(float((origin - np.array(center)) @ away)) / across
@@ -165,7 +176,7 @@ FLAT = frame_along((0, 0, 1), (0, 0, 0))
 @pytest.mark.parametrize("x", [0.0, 0.3, 0.999, 1.001, 5.0])
 def test_lines_along_the_axis_of_a_cylinder_meet_its_caps(x: float) -> None:
     cylinder = Cylinder(frame=FLAT, radius=1.0, height=3.0)
-    chord = body(cylinder).chord(np.array([[x, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]]))
+    chord = body(cylinder).chords(np.array([[x, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]]))[0]
     if x > 1:
         assert chord.t_in[0] > chord.t_out[0]
         return
@@ -177,7 +188,7 @@ def test_lines_along_the_axis_of_a_cylinder_meet_its_caps(x: float) -> None:
 @pytest.mark.parametrize("height", [-0.5, 0.5, 1.5])
 def test_lines_along_the_faces_of_a_slab_are_inside_or_outside(height: float) -> None:
     slab = box(np.zeros(3), np.array([50.0, 50.0, 1.0]))
-    chord = body(slab).chord(np.array([[0.0, 0.0, height]]), np.array([[1.0, 0.0, 0.0]]))
+    chord = body(slab).chords(np.array([[0.0, 0.0, height]]), np.array([[1.0, 0.0, 0.0]]))[0]
     if abs(height) > 1:
         assert chord.t_in[0] > chord.t_out[0]
     else:
@@ -185,7 +196,7 @@ def test_lines_along_the_faces_of_a_slab_are_inside_or_outside(height: float) ->
 
 
 def test_a_line_that_starts_inside_enters_behind_itself() -> None:
-    chord = body(Sphere(center=(0, 0, 0), radius=2)).chord(
+    (chord,) = body(Sphere(center=(0, 0, 0), radius=2)).chords(
         np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.0, -1.0]])
     )
     assert (chord.t_in[0], chord.t_out[0]) == (-1.0, 3.0)
@@ -195,7 +206,7 @@ def test_a_line_that_starts_inside_enters_behind_itself() -> None:
 def test_a_slab_of_any_thinness_has_its_two_faces(thickness: float) -> None:
     """Nothing in the closed form is thresholded."""
     slab = box(np.array([0.0, 0.0, -thickness / 2]), np.array([50.0, 50.0, thickness / 2]))
-    chord = body(slab).chord(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.6, -0.8]]))
+    chord = body(slab).chords(np.array([[0.0, 0.0, 1.0]]), np.array([[0.0, 0.6, -0.8]]))[0]
     assert chord.t_in[0] == pytest.approx(1.25, rel=4 * EPS)
     assert chord.t_out[0] - chord.t_in[0] == pytest.approx(thickness / 0.8, abs=4 * EPS * 1.25)
     assert chord.t_in[0] < chord.t_out[0]
@@ -232,7 +243,7 @@ def test_the_chord_of_a_convex_mesh_is_where_the_line_crosses_its_triangles(
     crossed = np.all(volumes > 0, axis=1) | np.all(volumes < 0, axis=1)
     weights = volumes[crossed] / volumes[crossed].sum(axis=1, keepdims=True)
     hits = np.sort(np.einsum("ij,ijk->ik", weights, corners[crossed]) @ direction)
-    chord = BALL_BODY.chord(origin[None], direction[None])
+    chord = BALL_BODY.chords(origin[None], direction[None])[0]
     assert len(hits) in (0, 2)
     if not len(hits):
         assert chord.t_out[0] < chord.t_in[0]
@@ -253,9 +264,9 @@ def test_many_lines_are_the_same_as_one_by_one() -> None:
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     assert 4000 * len(mesh.triangles) > 2_000_000
     solid = body(mesh)
-    whole = solid.chord(o, d)
+    whole = solid.chords(o, d)[0]
     for rows in (slice(0, 10), slice(1990, 2010), slice(3990, 4000)):
-        part = solid.chord(o[rows], d[rows])
+        part = solid.chords(o[rows], d[rows])[0]
         for name in ("t_in", "t_out", "n_in", "n_out"):
             assert (getattr(whole, name)[rows] == getattr(part, name)).all()
 
@@ -272,3 +283,98 @@ def test_a_mesh_that_is_not_convex_is_refused() -> None:
 def test_a_smoothly_shaded_mesh_is_refused() -> None:
     with pytest.raises(ValueError, match="no closed form"):
         body(icosphere(1, smooth=True))
+
+
+# --- lenses and cones -----------------------------------------------------------------------------
+
+
+def conicoid_above(p: Float, radius: float | None, conic: float) -> Float:
+    """How far below the face z = sag(r) points are, roughly: positive is below it."""
+    r2 = p[..., 0] ** 2 + p[..., 1] ** 2
+    if radius is None:
+        return np.asarray(-p[..., 2])
+    root = np.sqrt(np.maximum(1 - (1 + conic) * r2 / radius**2, 0))
+    return np.asarray(r2 / (radius * (1 + root)) - p[..., 2])
+
+
+def in_lens(lens: Lens, p: Float) -> Float:
+    """True where points (n, 3) are inside, by the definition of a lens, in its own frame."""
+    lower = conicoid_above(p, lens.radii[0], lens.conics[0]) < 0
+    upper = conicoid_above(p - [0, 0, lens.thickness], lens.radii[1], lens.conics[1]) > 0
+    return np.asarray(lower & upper & (np.hypot(p[..., 0], p[..., 1]) < lens.aperture))
+
+
+LENSES = {
+    "biconvex": ((4.0, -4.0), (0.0, 0.0), 0.8),
+    "biconcave": ((-4.0, 4.0), (0.0, 0.0), 0.3),
+    "plano-convex": ((None, -3.0), (0.0, 0.0), 0.6),
+    "meniscus": ((2.0, 3.0), (0.0, 0.0), 0.4),
+    "ellipsoid": ((3.0, None), (-0.44, 0.0), 1.0),
+    "hyperboloid": ((None, -3.0), (0.0, -2.25), 0.6),
+    "paraboloids": ((3.0, -3.0), (-1.0, -1.0), 0.7),
+    "rod with a round end": ((1.2, None), (0.0, 0.0), 5.0),
+}
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_lenses_are_where_their_definition_says(name: str) -> None:
+    """2000 random lines, each cut at its chords' ends: inside between them, outside elsewhere."""
+    radii, conics, thickness = LENSES[name]
+    place = Frame(origin=(0, 0, 0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    lens = Lens(frame=place, thickness=thickness, radii=radii, conics=conics, aperture=1.0)
+    rng = np.random.default_rng(7)
+    o = rng.normal(size=(2000, 3)) * 2
+    d = rng.normal(size=(2000, 3)) * 0.5 + np.array([0, 0, thickness / 2]) - o
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    parts = body(lens).chords(o, d)
+    t = np.linspace(-12, 12, 1201)
+    for k in range(len(o)):
+        inside = in_lens(lens, o[k] + t[:, None] * d[k])
+        said = np.zeros(len(t), bool)
+        near = np.zeros(len(t), bool)
+        for part in parts:
+            if part.t_in[k] < part.t_out[k]:
+                said |= (t > part.t_in[k]) & (t < part.t_out[k])
+                for end in (part.t_in[k], part.t_out[k]):
+                    near |= np.abs(t - end) < 1e-9
+        assert (said == inside)[~near].all(), (name, k)
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_normals_of_lenses_point_outwards(name: str) -> None:
+    radii, conics, thickness = LENSES[name]
+    place = Frame(origin=(0, 0, 0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    lens = Lens(frame=place, thickness=thickness, radii=radii, conics=conics, aperture=1.0)
+    x = np.linspace(-0.95, 0.95, 39)
+    o = np.stack([x, 0.1 + 0 * x, np.full_like(x, -9.0)], axis=1)
+    d = np.tile([0.02, 0.0, 1.0], (len(x), 1)) / math.hypot(0.02, 1)
+    for part in body(lens).chords(o, d):
+        real = part.t_in < part.t_out
+        for t, n in ((part.t_in, part.n_in), (part.t_out, part.n_out)):
+            p = o[real] + t[real, None] * d[real]
+            assert np.abs(np.linalg.norm(n[real], axis=1) - 1).max(initial=0) <= 8 * EPS
+            assert not in_lens(lens, p + 1e-6 * n[real]).any()
+            assert in_lens(lens, p - 1e-6 * n[real]).all()
+
+
+@pytest.mark.parametrize("top", [0.0, 0.4])
+def test_cones(top: float) -> None:
+    place = Frame(origin=(0, 0, 0), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    cone = Cone(frame=place, radius=1.0, top_radius=top, height=1.5)
+
+    def inside(p: Float) -> Float:
+        mantle = 1.0 - (1.0 - top) * p[..., 2] / 1.5
+        return np.asarray(
+            (p[..., 2] > 0) & (p[..., 2] < 1.5) & (np.hypot(p[..., 0], p[..., 1]) < mantle)
+        )
+
+    rng = np.random.default_rng(3)
+    o = rng.normal(size=(2000, 3)) * 2
+    d = rng.normal(size=(2000, 3)) * 0.5 + np.array([0, 0, 0.7]) - o
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    (chord,) = body(cone).chords(o, d)
+    t = np.linspace(-12, 12, 1201)
+    for k in range(len(o)):
+        said = (t > chord.t_in[k]) & (t < chord.t_out[k])
+        near = (np.abs(t - chord.t_in[k]) < 1e-9) | (np.abs(t - chord.t_out[k]) < 1e-9)
+        assert (said == inside(o[k] + t[:, None] * d[k]))[~near].all(), k

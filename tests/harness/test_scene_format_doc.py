@@ -13,8 +13,11 @@ from pydantic import BaseModel
 
 from harness.errors import InputError
 from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
     IMAGE_OBSERVABLES,
+    IMPLIED_OBSERVABLES,
     LIGHT_OBSERVABLES,
+    RAY_API_OBSERVABLES,
     TRUTH_OBSERVABLES,
     Observable,
 )
@@ -90,8 +93,14 @@ def test_mistakes_are_reported_as_shown(tmp_path: Path) -> None:
 
 def test_every_observable_is_listed() -> None:
     def needs(observable: Observable) -> str:
+        if observable in IMPLIED_OBSERVABLES:
+            return "variants"
+        if observable in ALL_LIGHT_OBSERVABLES:
+            return "a probe of all light"
         if observable in LIGHT_OBSERVABLES:
             return "a probe of light"
+        if observable in RAY_API_OBSERVABLES:
+            return "a ray API"
         if observable not in IMAGE_OBSERVABLES:
             return "a probe"
         return "a picture" if observable in TRUTH_OBSERVABLES else "two pictures"

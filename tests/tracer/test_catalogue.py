@@ -17,8 +17,8 @@ from tests.catalogue import EPS, Row, numbers, rounding_bound, rows
 from tests.tracer.scenes import angles, axis_crossing, down, glass, one, prism, slab, wall
 from tracer import optics
 from tracer.camera import Orthographic
+from tracer.image import render
 from tracer.path import HIT, TIR
-from tracer.recursion import render
 from tracer.scene import Medium, Scene, Solid, ThinSlab, Transport
 from tracer.shapes import Plane, Sphere
 from tracer.solids import Cell, cylinder, lens, polyhedron

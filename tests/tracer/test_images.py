@@ -10,9 +10,9 @@ import pytest
 
 from tracer.camera import Orthographic, Perspective
 from tracer.errors import SceneError
+from tracer.image import render
 from tracer.mesh import Mesh
 from tracer.patterns import Checker, Constant, Picture, PositionCode, Ramp
-from tracer.recursion import render
 from tracer.scene import (
     Diffuse,
     Emissive,

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from tests.tracer.scenes import CAMERA, Floats, angles, cube, cube_mesh, glass, prism, wall
 from tracer import optics
+from tracer.image import render
 from tracer.path import HIT, MISS, TIR, follow
-from tracer.recursion import render
 from tracer.scene import Medium, Scene, Solid, Surface, ThinSlab, Transport
 from tracer.shapes import Plane, Quadric, Rectangle, Sphere
 from tracer.solids import Cell, cone, cylinder, lens

@@ -13,10 +13,10 @@ import pytest
 from tests.tracer.scenes import GLASS, X, Y, Z, angles, cube, cube_mesh, glass
 from tracer.camera import Perspective
 from tracer.errors import SceneError
+from tracer.image import render
 from tracer.mesh import Mesh
 from tracer.path import follow
 from tracer.patterns import Constant
-from tracer.recursion import render
 from tracer.scene import (
     Diffuse,
     Emissive,

@@ -1,0 +1,71 @@
+"""What a case's page tells its script: one JSON document in the page, see ui/src/case.ts."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from harness.record import CaseRecord, Curve, RendererRun, Verdict
+from harness.report.chart import LEFT, RIGHT, Chart
+from harness.report.links import RunFolder, clean
+from harness.report.view import renderer_verdict
+
+
+def case_data(
+    record: CaseRecord, folder: RunFolder, colours: Mapping[str, str], charts: Sequence[Chart]
+) -> Markup:
+    """The data block's text: JSON in which nothing can end a script element."""
+    href = folder.href(record.pack)
+    verdicts = {run.name: renderer_verdict(run.name, record.checks, run) for run in record.runs}
+    return embeddable(
+        {
+            "id": record.id,
+            "packs": [{"href": href, "prefix": ""}] if href else [],
+            "colours": dict(colours),
+            "verdicts": {name: verdict for name, verdict in verdicts.items() if verdict},
+            "absent": [_absent(run) for run in record.runs if not run.images],
+            "curves": [
+                _curve(curve, chart) for curve, chart in zip(record.curves, charts, strict=True)
+            ],
+        }
+    )
+
+
+def embeddable(data: object) -> Markup:
+    """`data` as JSON that may stand in a page's script element."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
+
+
+def _absent(run: RendererRun) -> dict[str, str]:
+    word = "crashed" if run.status == Verdict.ERROR else "no picture"
+    return {"name": clean(run.name), "word": word, "reason": clean(run.reason)}
+
+
+def _curve(curve: Curve, chart: Chart) -> dict[str, Any]:
+    residuals = {series.renderer: series.y for series in curve.residuals}
+    return {
+        "low": chart.x_axis.low,
+        "high": chart.x_axis.high,
+        "left": LEFT,
+        "right": RIGHT,
+        "unit": "°" if "°" in curve.x_label else "",
+        "byIncidence": "incidence" in curve.x_label,
+        "lines": [
+            {
+                "renderer": clean(series.renderer),
+                "x": _finite(series.x),
+                "y": _finite(series.y),
+                "residual": _finite(residuals.get(series.renderer, [])),
+            }
+            for series in curve.series
+        ],
+    }
+
+
+def _finite(values: Sequence[float]) -> list[float | None]:
+    return [float(f"{v:.7g}") if math.isfinite(v) else None for v in values]

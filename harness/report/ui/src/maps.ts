@@ -1,0 +1,64 @@
+// The modes that show a figure per pixel: what it is, in which unit, on which scale.
+
+import type { Scale } from "./colour";
+import { deltaE, difference, dissimilarity, relative } from "./metrics";
+import type { Image } from "./pack";
+import type { Mode } from "./state";
+
+export interface MapMode {
+  readonly title: string;
+  readonly unit: string;
+  /** Exposure moves the end of the scale, as it does in tev; each stop halves it. */
+  readonly scale: (exposure: number) => Scale;
+  readonly figures: ((a: Image, b: Image) => Float32Array) | null; // null: comes with the rays
+}
+
+const up = (high: number, decades: number) => (exposure: number): Scale => {
+  const end = high * 2 ** -exposure;
+  return { colours: "inferno", low: end / 10 ** decades, high: end, log: true };
+};
+
+export const MAPS: Partial<Record<Mode, MapMode>> = {
+  diff: { title: "|A − B|", unit: "radiance", scale: up(1, 8), figures: difference },
+  relative: {
+    title: "(A − B) / max(|A|, |B|)",
+    unit: "",
+    scale: (exposure) => {
+      const end = 0.1 * 2 ** -exposure;
+      return { colours: "signed", low: -end, high: end, log: false };
+    },
+    figures: relative,
+  },
+  ssim: { title: "1 − SSIM", unit: "", scale: up(1, 6), figures: dissimilarity },
+  deltae: {
+    title: "ΔE₀₀",
+    unit: "",
+    scale: (exposure) => ({ colours: "inferno", low: 0, high: 10 * 2 ** -exposure, log: false }),
+    figures: deltaE,
+  },
+  rays: { title: "ray error", unit: "µrad", scale: up(1e5, 9), figures: null },
+};
+
+/** Of figures (W × H): the largest that are not neighbours of a larger one, with their places. */
+export function worstPixels(
+  figures: Float32Array, width: number, most = 8,
+): { x: number; y: number; value: number }[] {
+  const reach = Math.max(2, Math.round(width / 48));
+  const rank = (k: number): number => {
+    const value = Math.abs(figures[k] as number);
+    return Number.isNaN(value) ? -1 : value;
+  };
+  const order = Uint32Array.from(figures.keys()).filter((k) => rank(k) > 0);
+  const threshold = [...Array.from(order, rank)].sort((p, q) => q - p)[4000] ?? 0;
+  const candidates = [...order].filter((k) => rank(k) >= threshold).sort((p, q) => rank(q) - rank(p));
+  const found: { x: number; y: number; value: number }[] = [];
+  for (const k of candidates) {
+    const x = k % width;
+    const y = Math.floor(k / width);
+    if (found.every((f) => Math.hypot(f.x - x, f.y - y) > reach)) {
+      found.push({ x, y, value: figures[k] as number });
+      if (found.length === most) break;
+    }
+  }
+  return found;
+}

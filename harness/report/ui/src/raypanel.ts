@@ -1,0 +1,85 @@
+// The ray of the pinned pixel: its section, its landing points magnified, its figures.
+
+import { h } from "./dom";
+import { number } from "./format";
+import type { Ray, Rays } from "./rays";
+import { landingOf, sectionOf } from "./section";
+import type { Pixel } from "./state";
+import { solidView } from "./solidview";
+import { dot, length, minus, unit } from "./vector";
+
+const STATUS = ["landed", "missed", "totally reflected", "met another interface first"];
+
+export class RayPanel {
+  readonly element: HTMLElement;
+  private readonly body = h("div", { class: "ray-body" });
+  private readonly chooser = h("select", { "aria-label": "Probe" });
+  private pixel: Pixel | null = null;
+  private shownFor = "";
+
+  constructor(private readonly rays: readonly Rays[], private readonly colours: Readonly<Record<string, string>>) {
+    rays.forEach((one, k) => this.chooser.append(
+      h("option", { value: k }, `probe ${one.probe.name}, path ${one.probe.path || "direct"}`)));
+    this.chooser.addEventListener("change", () => this.draw());
+    this.element = h("section", { id: "ray", class: "ray-panel", "aria-labelledby": "h-ray", hidden: !rays.length },
+      h("div", { class: "section-head" }, h("h2", { id: "h-ray" }, "The ray of a pixel"), this.chooser),
+      this.body);
+    this.draw();
+  }
+
+  show(pixel: Pixel | null): void {
+    this.pixel = pixel;
+    this.draw();
+  }
+
+  private draw(): void {
+    const rays = this.rays[Number(this.chooser.value) || 0];
+    if (!rays) return;
+    const { width, height } = rays.probe;
+    const ray = rays.nearest(this.pixel?.x ?? width * 0.68, this.pixel?.y ?? height / 2);
+    const key = `${this.chooser.value} ${ray.x} ${ray.y} ${this.pixel !== null}`;
+    if (key === this.shownFor) return;
+    this.shownFor = key;
+    this.body.replaceChildren(
+      h("figure", { class: "card" }, sectionOf(rays, ray, this.colours)),
+      h("div", { class: "ray-facts" },
+        h("p", {}, h("b", {}, `Ray of pixel (${ray.x}, ${ray.y})`), ` ${STATUS[ray.status] ?? ""}`,
+          !this.pixel && h("span", { class: "muted" }, "; click a pixel above for another")),
+        interfaceTable(ray), rendererTable(ray, this.colours), landingOf(rays, ray, this.colours),
+        solidView(rays, ray)));
+  }
+}
+
+function interfaceTable(ray: Ray): HTMLElement | null {
+  if (!ray.letters) return null;
+  const angle = (value: number | undefined): string =>
+    value === undefined || !Number.isFinite(value) ? "–" : `${value.toFixed(4)}°`;
+  return h("table", { class: "mini-table" },
+    h("thead", {}, h("tr", {}, ...["interface", "", "θᵢ", "θₜ"].map((t) => h("th", { scope: "col" }, t)))),
+    h("tbody", {}, ...[...ray.letters].map((letter, k) => h("tr", {},
+      h("th", { scope: "row" }, String(k + 1)),
+      h("td", {}, letter === "T" ? "transmitted" : "reflected"),
+      h("td", { class: "num" }, angle(ray.thetaI[k])),
+      h("td", { class: "num" }, letter === "T" ? angle(ray.thetaT[k]) : angle(ray.thetaI[k]))))));
+}
+
+function rendererTable(ray: Ray, colours: Readonly<Record<string, string>>): HTMLElement | null {
+  if (ray.status !== 0) return null;
+  const last = ray.vertices[ray.vertices.length - 1];
+  const before = ray.vertices[ray.vertices.length - 2];
+  const direction = last && before ? unit(minus(last, before)) : null;
+  return h("table", { class: "mini-table" },
+    h("thead", {}, h("tr", {}, ...["renderer", "landed off by", "direction off by"].map((t) =>
+      h("th", { scope: "col" }, t)))),
+    h("tbody", {}, ...ray.renderers.map((r) => {
+      const seen = r.shift.every(Number.isFinite);
+      const across = direction
+        ? length(minus(r.turn, [0, 1, 2].map((k) => dot(r.turn, direction) * (direction[k] ?? 0)) as unknown as typeof r.turn))
+        : Number.NaN;
+      return h("tr", {},
+        h("th", { scope: "row" }, h("span", { class: `renderer ${colours[r.name] ?? "c7"}` },
+          h("i", { class: "dot", "aria-hidden": "true" }), r.name)),
+        h("td", { class: "num" }, seen ? `${number(length(r.shift), 3)} units` : "not seen"),
+        h("td", { class: "num" }, Number.isFinite(across) ? `${number(across * 1e6, 3)} µrad` : "–"));
+    })));
+}

@@ -1,0 +1,250 @@
+"""The truth of all paths at once: each ray becomes two at every interface, in closed form.
+
+Where `harness.truth` follows one stated path, this follows the whole tree that double recursion
+makes, branch by branch, for many rays at a time. It says which other paths share a pixel, how much
+light all paths together bring, and what nature would have made of it.
+
+*Nature* is polarised. Natural light is two independent waves, polarised across each other; each is
+split into its parts along and across every plane of incidence, and those have Fresnel coefficients
+of their own (M. Born and E. Wolf, Principles of Optics, 7th ed., section 1.5.2; after total
+internal reflection they are complex, section 1.5.4). A renderer that averages the two at every
+interface forgets what the first one did to the light, and is wrong behind the second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.expected import Float, fresnel, reflect, refract
+from harness.renderers.base import Rays, Status
+from harness.scene.resolved import Rectangle
+from harness.truth import Boundary, ClosedForm
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Those k of the m rays that took `path`, after its last interface.
+
+    `rows` (k,) says which. `weight` (k,) is the product of unpolarised Fresnel factors, `natural`
+    (k,) that of polarised light, `absorbed` (k, 3) the optical depth so far. The next interface is
+    `ahead` (k,) away, infinite where there is none.
+    """
+
+    path: str
+    rows: NDArray[np.intp]
+    origin: Float
+    direction: Float
+    medium: NDArray[np.intp]
+    weight: Float
+    natural: Float
+    absorbed: Float
+    ahead: Float
+
+
+@dataclass(frozen=True)
+class _Front:
+    """The state of the rays of one branch between two interfaces.
+
+    `field` (k, 2, 3) holds the electric fields of two waves of unit power, polarised across each
+    other, in amplitudes whose square is power per beam.
+    """
+
+    path: str
+    rows: NDArray[np.intp]
+    o: Float
+    d: Float
+    inside: NDArray[np.bool_]
+    medium: NDArray[np.intp]
+    weight: Float
+    absorbed: Float
+    field: Complex
+
+    def take(self, keep: NDArray[np.bool_]) -> _Front:
+        """Only the rays `keep` (k,)."""
+        return _Front(
+            self.path, self.rows[keep], self.o[keep], self.d[keep], self.inside[:, keep],
+            self.medium[keep], self.weight[keep], self.absorbed[keep], self.field[keep],
+        )  # fmt: skip
+
+
+def branches(
+    form: ClosedForm,
+    rays: Rays,
+    depth: int,
+    min_weight: float = 0.0,
+    along: str | None = None,
+    partial: bool = True,
+) -> Iterator[Branch]:
+    """All branches of at most `depth` segments and at least `min_weight`, depth first.
+
+    With `along`, only those that start as it does; without `partial`, only those that are reflected
+    where all light is.
+    """
+    inside = form.enclosed(rays)
+    m = len(rays.origins)
+    start = _Front(
+        "", np.arange(m), rays.origins, rays.directions, inside,
+        np.full(m, form.scene.camera.medium, np.intp), np.ones(m), np.zeros((m, 3)),
+        _two_waves(rays.directions),
+    )  # fmt: skip
+    waiting = [start]
+    while waiting:
+        front = waiting.pop()
+        met = form.next_interface(front.o, front.d, front.inside)
+        yield Branch(
+            front.path, front.rows, front.o, front.d, front.medium, front.weight,
+            np.einsum("kij,kij->k", front.field, front.field.conj()).real / 2, front.absorbed,
+            met.t,
+        )  # fmt: skip
+        goes_on = np.isfinite(met.t)
+        if len(front.path) + 1 >= depth or not goes_on.any():
+            continue
+        met = Boundary(met.t[goes_on], met.n[goes_on], met.which[goes_on], met.beyond[goes_on])
+        for child in _split(form, front.take(goes_on), met, partial):
+            child = child.take(child.weight > min_weight) if min_weight else child
+            if len(child.rows) and (along is None or along.startswith(child.path)):
+                waiting.append(child)
+
+
+def _split(form: ClosedForm, front: _Front, met: Boundary, partial: bool) -> tuple[_Front, _Front]:
+    """Both rays that each ray becomes at its interface; one where there is total reflection."""
+    ior = np.array([medium.ior for medium in form.scene.media])
+    sigma = np.array([medium.absorption for medium in form.scene.media])
+    ior_i, ior_t = ior[front.medium], ior[met.beyond]
+    o = front.o + met.t[:, None] * front.d
+    absorbed = front.absorbed + met.t[:, None] * sigma[front.medium]
+    cos_i = np.clip(-np.einsum("ij,ij->i", front.d, met.n), 0, 1)
+    reflectance = fresnel(cos_i, ior_i, ior_t)
+    bent, total = refract(front.d, met.n, ior_i, ior_t)
+    back = reflect(front.d, met.n)
+    r, t = _amplitudes(cos_i, ior_i, ior_t)
+    everyone = np.full(len(o), partial)
+
+    def child(letter: str, d: Float, weight: Float, amplitude: Complex, crosses: bool) -> _Front:
+        inside = front.inside.copy()
+        if crosses:
+            inside[met.which, np.arange(len(o))] ^= True
+        field = _turned(front.field, front.d, d, met.n, amplitude)
+        medium = met.beyond if crosses else front.medium
+        return _Front(
+            front.path + letter, front.rows, o, d, inside, medium, front.weight * weight, absorbed,
+            field,
+        ).take(~total if crosses else everyone | total)  # fmt: skip
+
+    return child("R", back, reflectance, r, False), child("T", bent, 1 - reflectance, t, True)
+
+
+def _amplitudes(cos_i: Float, ior_i: Float, ior_t: Float) -> tuple[Complex, Complex]:
+    """(k, 2) Fresnel coefficients of s and p, reflected and transmitted, as roots of power.
+
+    Born & Wolf, 1.5.2, equations 20 and 21; transmitted ones times sqrt(n_t cos_t / n_i cos_i), so
+    that their squares are T. cos_t is imaginary under total internal reflection.
+    """
+    eta = ior_i / ior_t
+    # Negative where there is total reflection; the root is i times that of its size.
+    cos2_t = (1 - eta) * (1 + eta) + (eta * cos_i) ** 2
+    cos_t = np.sqrt(cos2_t.astype(np.complex128))
+    r_s = (ior_i * cos_i - ior_t * cos_t) / (ior_i * cos_i + ior_t * cos_t)
+    r_p = (ior_t * cos_i - ior_i * cos_t) / (ior_t * cos_i + ior_i * cos_t)
+    power = np.sqrt(np.maximum(1 - np.abs(np.stack([r_s, r_p], axis=1)) ** 2, 0.0))
+    return np.stack([r_s, r_p], axis=1), power.astype(np.complex128)
+
+
+def _turned(field: Complex, d: Float, out: Float, n: Float, amplitude: Complex) -> Complex:
+    """The fields after an interface: their s parts stay along s, their p parts turn with the ray.
+
+    s = d x n, p = s x d. At normal incidence any s across the ray will do.
+    """
+    s = np.cross(d, n)
+    length = np.linalg.norm(s, axis=1, keepdims=True)
+    s = np.where(length > 1e-12, s / np.where(length > 0, length, 1.0), _across(d))
+    s -= np.einsum("ij,ij->i", s, out)[:, None] * out
+    s /= np.linalg.norm(s, axis=1, keepdims=True)
+    along_s = np.einsum("kij,kj->ki", field, s) * amplitude[:, :1]
+    along_p = np.einsum("kij,kj->ki", field, np.cross(s, d)) * amplitude[:, 1:]
+    turned = along_s[:, :, None] * s[:, None] + along_p[:, :, None] * np.cross(s, out)[:, None]
+    return np.asarray(turned, np.complex128)
+
+
+def _across(d: Float) -> Float:
+    """A unit vector across each direction."""
+    helper = np.where(np.abs(d[:, :1]) < 0.6, [[1.0, 0, 0]], [[0, 1.0, 0]])
+    e = np.cross(d, helper)
+    return np.asarray(e / np.linalg.norm(e, axis=1, keepdims=True))
+
+
+def _two_waves(d: Float) -> Complex:
+    e = _across(d)
+    return np.stack([e, np.cross(d, e)], axis=1).astype(np.complex128)
+
+
+# --- what the tree says ---------------------------------------------------------------------------
+
+
+def natural_weight(form: ClosedForm, rays: Rays, path: str) -> Float:
+    """(m,) the weight of `path` for natural, hence polarised, light; NaN where nothing takes it."""
+    weight = np.full(len(rays.origins), np.nan)
+    for branch in branches(form, rays, len(path) + 1, along=path):
+        if branch.path == path:
+            weight[branch.rows] = branch.natural
+    return weight
+
+
+@dataclass(frozen=True)
+class AllLight:
+    """What all paths bring together: `level` (m, 3) by a renderer's unpolarised Fresnel factors,
+    `natural` (m, 3) by nature's, and `cut` (m,) the weight of paths left out as too weak.
+    """
+
+    level: Float
+    natural: Float
+    cut: Float
+
+
+def light_on(
+    form: ClosedForm,
+    rays: Rays,
+    plane: Rectangle,
+    depth: int,
+    min_weight: float,
+    n2: bool = False,
+) -> AllLight:
+    """The radiance that rays see of `plane` shining with radiance 1, by all paths together.
+
+    `n2`: radiance scales with the square of the index of the medium that it is in.
+    """
+    ior = np.array([medium.ior for medium in form.scene.media])
+    per_medium = (ior[form.scene.camera.medium] / ior) ** 2 if n2 else np.ones(len(ior))
+    m = len(rays.origins)
+    level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    for branch in branches(form, rays, depth, min_weight):
+        landing = form.meet(
+            plane, branch.origin, branch.direction, branch.ahead, branch.medium, branch.absorbed
+        )
+        on = landing.status == Status.HIT
+        ends = on | ~np.isfinite(branch.ahead)
+        rows = branch.rows[on]
+        left = landing.transmission[on] * per_medium[branch.medium[on]][:, None]
+        level[rows] += branch.weight[on, None] * left
+        natural[rows] += branch.natural[on, None] * left
+        followed[branch.rows[ends]] += branch.weight[ends]
+    return AllLight(level, natural, 1 - followed)
+
+
+def light_around(form: ClosedForm, rays: Rays, depth: int, min_weight: float) -> AllLight:
+    """The same where everything around shines with radiance 1: a white furnace."""
+    m = len(rays.origins)
+    level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    for branch in branches(form, rays, depth, min_weight):
+        leaves = ~np.isfinite(branch.ahead)
+        rows, left = branch.rows[leaves], np.exp(-branch.absorbed[leaves])
+        level[rows] += branch.weight[leaves, None] * left
+        natural[rows] += branch.natural[leaves, None] * left
+        followed[rows] += branch.weight[leaves]
+    return AllLight(level, natural, 1 - followed)

@@ -1,0 +1,121 @@
+"""Every scene of the suite: its truth passes its own checks, and a wrong index does not.
+
+The "renderer" is the closed form itself, of the scene and of one with all indices a thousandth too
+large: so nothing is rendered, and what a check sees or is blind to shows for every scene at once.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from harness.camera import primary_rays
+from harness.data import scenes_root
+from harness.judge import CaseJudge
+from harness.measure.observables import IMAGE_OBSERVABLES, Observable
+from harness.plan import Form, PreparedCase, light_role, prepare, trace_role
+from harness.preflight import FLOAT32, FLOAT64, Preflight
+from harness.record import Check, Verdict
+from harness.renderers.base import Capability, Image, RayPaths, Status
+from harness.results import Contender, Result, Results
+from harness.scene import model
+from harness.scene.load import LoadedCase, load_cases, scene_files
+from harness.scene.resolve import expand_thin_slabs
+from harness.scene.resolved import ResolvedScene
+from harness.tree import light_on
+from harness.truth import ClosedForm
+
+TRUTH = Contender(
+    "truth", "1", frozenset({Capability.RAYS, Capability.DOUBLE, Capability.DOUBLE_DATA}),
+    Preflight(FLOAT32, 4095, 0.0, FLOAT64, None),
+)  # fmt: skip
+# Directions behind faces that are parallel, or are when unfolded, do not depend on the index, nor
+# does a prism's reversibility; a total reflection is total.
+BLIND = {Observable.FOLDED_DIRECTION, Observable.REVERSIBILITY}
+PLATES = (
+    "slab",
+    "stack",
+    "thin-face",
+    "immersed-slab",
+    "tir-prism",
+    "retroreflector",
+    "light-pipe",
+)
+
+
+@cache
+def first_cases() -> dict[str, LoadedCase]:
+    """The first permutation of every scene file."""
+    return {case.case: case for path in scene_files(scenes_root()) for case in load_cases(path)[:1]}
+
+
+def measured_by_truth(case: PreparedCase, change: float) -> dict[tuple[str, str], Result]:
+    """What the closed form of the case shows when all indices are off by `change`, relatively."""
+    results: dict[tuple[str, str], Result] = {}
+    for form in case.forms:
+        scene = _changed(expand_thin_slabs(form.scene), change)
+        for probe in case.loaded.model.probes:
+            role = trace_role if probe.measure == "position" else light_role
+            results["truth", role(probe, form.name)] = _result(scene, probe, form)
+    return results
+
+
+def _changed(scene: ResolvedScene, change: float) -> ResolvedScene:
+    media = [m.model_copy(update={"ior": m.ior * (1 + change)}) for m in scene.media[1:]]
+    return scene.model_copy(update={"media": (scene.media[0], *media)})
+
+
+def _result(scene: ResolvedScene, probe: model.Probe, form: Form) -> Result:
+    exact, rays = ClosedForm(scene), primary_rays(scene)
+    plane = form.planes[probe.name][0]
+    if probe.measure != "position":
+        depth = len(probe.path) + 1 if probe.measure == "light" else scene.transport.max_depth
+        least = 0.0 if probe.measure == "light" else scene.transport.min_weight
+        level = light_on(exact, rays, plane, depth, least).level
+        return Image(level.reshape(scene.film.height, scene.film.width, 3).astype(np.float32))
+    paths = exact.follow(rays, probe.path)
+    landing = exact.land(paths, plane)
+    stations = np.concatenate(
+        [rays.origins[:, None], paths.interface, landing.point[:, None]], axis=1
+    )
+    way = np.linalg.norm(np.diff(stations, axis=1), axis=2)
+    first = scene.media[scene.camera.medium].ior
+    ior = first / np.cumprod(np.insert(paths.eta_i_over_t, 0, 1.0, axis=1), axis=1)
+    status = landing.status.copy()
+    surface = np.where(status == Status.HIT, 0, -1).astype(np.int32)
+    return RayPaths(
+        status, surface, landing.point, paths.direction, paths.weight, (ior * way).sum(axis=1)
+    )
+
+
+def verdicts(case: PreparedCase, change: float) -> list[Check]:
+    film = case.scene.film
+    checks = [
+        c.model_copy(update={"known": ()})
+        for c in case.loaded.model.checks
+        if Observable(c.observable) not in IMAGE_OBSERVABLES | {Observable.RAY_AGREEMENT}
+    ]
+    loaded = case.loaded
+    slim = loaded.model.model_copy(update={"checks": tuple(checks)})
+    again = PreparedCase(
+        LoadedCase(loaded.id, loaded.case, loaded.file, loaded.parameters, slim), case.scene,
+        case.variants,
+    )  # fmt: skip
+    results = Results(measured_by_truth(case, change), film.width, film.height)
+    return CaseJudge(again, [TRUTH], results, "truth").judge().checks
+
+
+@pytest.mark.parametrize("name", list(first_cases()))
+def test_the_truth_passes_and_a_wrong_index_does_not(name: str) -> None:
+    case = prepare(first_cases()[name])
+    right = verdicts(case, 0.0)
+    assert {c.status for c in right} <= {Verdict.PASS}, [
+        (c.id, c.reason) for c in right if c.status is not Verdict.PASS
+    ]
+    for check in verdicts(case, 1e-3):
+        blind = Observable(check.observable) in BLIND or check.against == "variant"
+        plate = name.startswith(PLATES) and check.observable == Observable.EXIT_DIRECTION
+        if not blind and not plate:
+            assert check.status in (Verdict.FAIL, Verdict.ERROR), (check.id, check.value)
