@@ -40,7 +40,7 @@ LAYERS = (
     ("verdict", "preflight", "attribution"),
     ("report",),
     ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "run"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
     ("doctor", "ci"),
     ("show", "cli", "pytest_plugin"),
 )
