@@ -97,6 +97,7 @@ class Session:
         self.used: dict[str, set[int]] = {name: set() for name in self.names}
         self.render_s = dict.fromkeys(self.names, 0.0)
         self.effort = Effort()
+        self.records: list[CaseRecord] = []
 
     @property
     def everyone_is_here(self) -> bool:
@@ -277,6 +278,8 @@ class Session:
         return bool(stood) and all(contender.stored is not None for contender in stood)
 
     def _finish(self, index: int, written: CaseRecord) -> None:
+        # Curves are long, and nobody asks for them here.
+        self.records.append(written.model_copy(update={"curves": [], "checks": []}))
         self.finished[index] = SummaryCase(
             id=written.id, family=written.family, status=written.status, checks=written.checks,
             diagnoses=written.diagnoses,

@@ -41,7 +41,7 @@ LAYERS = (
     ("report",),
     ("plan", "results", "probed", "pairs", "explain", "spectral", "judge"),
     ("baseline", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "run"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
     ("doctor", "ci"),
     ("show", "cli", "pytest_plugin"),
 )

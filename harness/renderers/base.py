@@ -35,6 +35,7 @@ class Capability(enum.StrEnum):
     CONE = "cone"
     LENS = "lens"  # with spherical or plane faces
     CONIC = "conic"  # lenses of other conics, too
+    CSG = "csg"  # unions, intersections and differences of what else it has
     MESH = "mesh"
     SMOOTH_MESH = "smooth-mesh"
     THIN_SLAB = "thin-slab"  # the lecture's thin face; others are given a real slab

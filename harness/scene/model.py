@@ -19,9 +19,11 @@ from harness.scene.shape_model import AsMesh as AsMesh
 from harness.scene.shape_model import Box as Box
 from harness.scene.shape_model import Cone as Cone
 from harness.scene.shape_model import Cylinder as Cylinder
+from harness.scene.shape_model import Difference as Difference
 from harness.scene.shape_model import Disk as Disk
 from harness.scene.shape_model import Finite as Finite
 from harness.scene.shape_model import Icosphere as Icosphere
+from harness.scene.shape_model import Intersection as Intersection
 from harness.scene.shape_model import Lens as Lens
 from harness.scene.shape_model import MeshData as MeshData
 from harness.scene.shape_model import MeshFile as MeshFile
@@ -40,6 +42,7 @@ from harness.scene.shape_model import SolidShape as SolidShape
 from harness.scene.shape_model import Sphere as Sphere
 from harness.scene.shape_model import Strict as Strict
 from harness.scene.shape_model import SurfaceShape as SurfaceShape
+from harness.scene.shape_model import Union as Union
 from harness.scene.shape_model import Unit as Unit
 from harness.scene.shape_model import Vec3 as Vec3
 from harness.scene.shape_model import Wedge as Wedge

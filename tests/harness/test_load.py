@@ -142,7 +142,8 @@ def test_case_names_are_fit_for_files() -> None:
 # --- what does not --------------------------------------------------------------------------------
 
 SHAPES = (
-    "box, cone, cylinder, icosphere, lens, mesh, polygons, prism, slab, sphere, triangles or wedge"
+    "box, cone, cylinder, difference, icosphere, intersection, lens, mesh, polygons, prism, slab, "
+    "sphere, triangles, union or wedge"
 )
 EDITS = {
     # name: (old, new, line, key, message, value, expected, suggestion); None matches anything
