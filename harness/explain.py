@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -98,13 +98,15 @@ POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
 
 
 def explain_run(
-    cases: Sequence[PreparedCase], judged: Sequence[SummaryCase], contenders: Sequence[Contender]
+    cases: Sequence[PreparedCase], judged: Sequence[SummaryCase], renderers: Mapping[str, str]
 ) -> list[Diagnosis]:
-    """Why each renderer is off in this run; nothing of those that are not."""
+    """Why each renderer is off in this run; nothing of those that are not.
+
+    `renderers` are named with the reason why they are out, which is "" where they are not.
+    """
     found: list[Diagnosis] = []
-    for contender in contenders:
-        renderer = contender.name
-        _, failed, findings = contender.reason.partition(FAILED_PREFLIGHT)
+    for renderer, reason in renderers.items():
+        _, failed, findings = reason.partition(FAILED_PREFLIGHT)
         if failed:
             found.append(explain_preflight(renderer, findings))
         by_case = {c.id: d for c in judged for d in c.diagnoses if d.renderer == renderer}

@@ -129,11 +129,15 @@ def _summary(
         wall_s=time.perf_counter() - session.began,
         quality=session.quality,
         command=command,
-        exit_code=EXIT_INTERRUPTED if interrupted else exit_code(cases, contenders),
+        exit_code=EXIT_INTERRUPTED
+        if interrupted
+        else exit_code(cases, {c.name: c.reason for c in contenders}),
         renderers={name: _renderer_summary(session, name) for name in session.names},
         counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
         cases=cases,
-        diagnoses=explain_run([state.case for state in session.states], cases, contenders),
+        diagnoses=explain_run(
+            [state.case for state in session.states], cases, {c.name: c.reason for c in contenders}
+        ),
         effort=session.effort.model_copy(update={"damaged": damaged}),
         interrupted=interrupted,
     )
