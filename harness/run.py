@@ -129,9 +129,7 @@ def _summary(
         wall_s=time.perf_counter() - session.began,
         quality=session.quality,
         command=command,
-        exit_code=EXIT_INTERRUPTED
-        if interrupted
-        else exit_code(cases, {c.name: c.reason for c in contenders}),
+        exit_code=EXIT_INTERRUPTED if interrupted else exit_code(cases, contenders),
         renderers={name: _renderer_summary(session, name) for name in session.names},
         counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
         cases=cases,
