@@ -24,6 +24,7 @@ TRIMMED = 0.05
 MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 16, 5, 2
 # A step that gains less than this in cost, a factor of 1.6 in likelihood, is the last.
 CRAWL = 0.5
+FARTHEST = 1e4  # no parameter is larger
 LARGEST = 1e15  # of a misfit, so that squares stay finite
 
 
@@ -103,10 +104,11 @@ def fit(
         return None
 
     def at(values: Values) -> _Point:
-        worlds = [
-            hypothesis.world(world, values) if mine else world
-            for world, mine in zip(right, concerned, strict=True)
-        ]
+        with np.errstate(all="ignore"):  # what is no number is no fit
+            worlds = [
+                hypothesis.world(world, values) if mine else world
+                for world, mine in zip(right, concerned, strict=True)
+            ]
         return _point(worlds, evidence, trimmed)
 
     tried = sorted(((at(start), start) for start in hypothesis.starts), key=lambda t: t[0].score)
@@ -135,7 +137,9 @@ def _descend(at: At, point: _Point, values: Values) -> tuple[_Point, Values, Flo
             break
         better = None
         for halving in range(MOST_HALVINGS):
-            there = tuple(np.array(values) + step / 2**halving)
+            there = tuple(float(v) for v in np.array(values) + step / 2**halving)
+            if max(map(abs, there)) > FARTHEST:
+                continue
             other = at(there)
             if other.score < point.score:
                 better = (other, there)
