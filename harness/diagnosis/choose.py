@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from harness.diagnosis.evidence import Evidence
-from harness.diagnosis.fit import TRIMMED, Fit, fit, truth_fit
+from harness.diagnosis.fit import CURSORY, FULL, TRIMMED, Fit, fit, truth_fit
 from harness.diagnosis.hypothesis import Fitted, Hypothesis
 from harness.diagnosis.library import LIBRARY
 from harness.record import Cause, CauseFit, Diagnosis
@@ -40,10 +40,11 @@ def complexity(hypothesis: Hypothesis, rays: int) -> float:
 
 def rank(evidence: Sequence[Evidence], trimmed: float) -> list[Ranked]:
     """All hypotheses that say something about the evidence, the best first."""
-    ranked = []
+    ranked, effort = [], FULL
     for hypothesis in LIBRARY:
-        found = fit(hypothesis, evidence, trimmed)
+        found = fit(hypothesis, evidence, trimmed, effort=effort)
         if found is not None:
+            effort = CURSORY if max(found.squares) <= 1 else effort
             cost = found.score + complexity(hypothesis, sum(found.rays))
             cost += min(hypothesis.prior(piece.setting) for piece in evidence)
             ranked.append(Ranked(found, cost))

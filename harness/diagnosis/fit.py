@@ -21,11 +21,23 @@ from harness.expected import Float
 
 # Rays that a wrong renderer's own edges may have spoilt: those of the truth are left out already.
 TRIMMED = 0.05
-MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 16, 5, 2
+MOST_HALVINGS = 5
 # A step that gains less than this in cost, a factor of 1.6 in likelihood, is the last.
 CRAWL = 0.5
 FARTHEST = 1e4  # no parameter is larger
 LARGEST = 1e15  # of a misfit, so that squares stay finite
+
+
+@dataclass(frozen=True)
+class Effort:
+    """From how many of a hypothesis's starts a fit descends, and in how many steps."""
+
+    starts: int
+    steps: int
+
+
+# Where another hypothesis explains everything already, the rest need not be fitted to the last.
+FULL, CURSORY = Effort(2, 16), Effort(1, 6)
 
 
 @dataclass(frozen=True)
@@ -80,6 +92,14 @@ def _point(
     return _Point(gaps, tuple(squares), tuple(rays), float(cost))
 
 
+def _nowhere(evidence: Sequence[Evidence]) -> _Point:
+    """As bad as can be."""
+    rays = tuple(len(piece.setting.pixel) for piece in evidence)
+    squares = tuple(LARGEST**2 for _ in rays)
+    gaps = [np.full((n, 3), LARGEST) for n in rays]
+    return _Point(gaps, squares, rays, sum(rays) / 2 * float(np.log1p(LARGEST**2)))
+
+
 def cost_of(worlds: Sequence[World], evidence: Sequence[Evidence]) -> float:
     """What it costs to explain the evidence by these worlds, one for each piece."""
     return _point(worlds, evidence).score
@@ -91,7 +111,11 @@ def truth_fit(evidence: Sequence[Evidence], trimmed: float = TRIMMED) -> _Point:
 
 
 def fit(
-    hypothesis: Hypothesis, evidence: Sequence[Evidence], trimmed: float = TRIMMED
+    hypothesis: Hypothesis,
+    evidence: Sequence[Evidence],
+    trimmed: float = TRIMMED,
+    *,
+    effort: Effort = FULL,
 ) -> Fit | None:
     """The best parameters by Gauss and Newton from the most promising starts.
 
@@ -104,30 +128,33 @@ def fit(
         return None
 
     def at(values: Values) -> _Point:
-        with np.errstate(all="ignore"):  # what is no number is no fit
-            worlds = [
-                hypothesis.world(world, values) if mine else world
-                for world, mine in zip(right, concerned, strict=True)
-            ]
-        return _point(worlds, evidence, trimmed)
+        try:
+            with np.errstate(all="ignore"):
+                worlds = [
+                    hypothesis.world(world, values) if mine else world
+                    for world, mine in zip(right, concerned, strict=True)
+                ]
+            return _point(worlds, evidence, trimmed)
+        except ArithmeticError:  # what is no number is no fit
+            return _nowhere(evidence)
 
     tried = sorted(((at(start), start) for start in hypothesis.starts), key=lambda t: t[0].score)
     if not hypothesis.size or not hypothesis.continuous:
         point, values = tried[0]
         return _result(hypothesis, point, values, np.zeros((hypothesis.size, hypothesis.size)))
     found = []
-    for point, start in tried[:STARTS_TRIED]:
-        found.append(_descend(at, point, start))
+    for point, start in tried[: effort.starts]:
+        found.append(_descend(at, point, start, effort.steps))
         if max(found[-1][0].squares) <= 1:
             break  # within all tolerances: nothing is better
     point, values, curvature = min(found, key=lambda f: f[0].score)
     return _result(hypothesis, point, values, curvature)
 
 
-def _descend(at: At, point: _Point, values: Values) -> tuple[_Point, Values, Float]:
+def _descend(at: At, point: _Point, values: Values, steps: int) -> tuple[_Point, Values, Float]:
     """Steps of Gauss and Newton, halved until they gain; the curvature (k, k) at the end."""
     curvature = np.zeros((len(values), len(values)))
-    for _ in range(MOST_STEPS):
+    for _ in range(steps):
         gradient, curvature = _slopes(at, point, values)
         try:
             step = -np.linalg.solve(curvature, gradient)
@@ -169,11 +196,14 @@ def _slopes(at: At, point: _Point, values: Values) -> tuple[Float, Float]:
         kept = each <= np.quantile(each, 1 - TRIMMED)
         for axis in range(k):
             kept &= (np.abs(slopes[axis][j]) < LARGEST).all(axis=1)
-        weight = 1 / (1 + point.squares[j]) / gap.shape[1]
+        # Rays that are far off, near a critical angle or through another facet, must not drown
+        # the others: their steps would be theirs alone.
+        weight = 1 / (1 + np.median(each) + each) / gap.shape[1]
+        weight = np.where(kept, weight, 0.0)[:, None]
         for a in range(k):
-            gradient[a] += weight * float((slopes[a][j] * gap)[kept].sum())
+            gradient[a] += float((weight * slopes[a][j] * gap).sum())
             for b in range(k):
-                curvature[a, b] += weight * float((slopes[a][j] * slopes[b][j])[kept].sum())
+                curvature[a, b] += float((weight * slopes[a][j] * slopes[b][j]).sum())
     return gradient, curvature
 
 
