@@ -48,10 +48,23 @@ def _scaled(world: World, a: Values) -> World:
 
 
 def _by_height(world: World, a: Values) -> World:
-    """The field of view meant for the width is taken for the height, where that is larger."""
+    """The field of view that is meant for the width is taken for the height."""
     film = world.scene.film
-    ratio = min(1.0, film.width / film.height) if a[0] > 0 else max(1.0, film.width / film.height)
-    return _scaled(world, (ratio ** abs(a[0]),))
+    return _scaled(world, (float(np.float64(film.width / film.height) ** a[0]),))
+
+
+def _portrait(world: World) -> bool:
+    return world.scene.film.width < world.scene.film.height
+
+
+def _landscape(world: World) -> bool:
+    return world.scene.film.width > world.scene.film.height
+
+
+def _says_axis(fit: Fitted) -> str:
+    if fit.near(1):
+        return "takes the field of view along the film's height instead of its width"
+    return f"scales the field of view by width / height to the power {fit}"
 
 
 def _stretched(world: World, a: Values) -> World:
@@ -93,10 +106,12 @@ SEEING = (
         ((0.5, 0.5), (-0.5, -0.5), (0.5, 0.0), (0.0, 0.5), (0.01, 0.0)), "shift", "pixels",
     ),
     Hypothesis(
-        "fov-axis", _by_height,
-        lambda f: "takes the field of view along the height where that is the longer side"
-        if f.near(1) else f"scales the field of view by the aspect to the power {f}",
-        ((1.0,), (-1.0,), (0.1,)), "power of the aspect",
+        "fov-axis", _by_height, _says_axis, ((1.0,), (0.1,)), "power of the aspect",
+        applies=_portrait,
+    ),
+    Hypothesis(
+        "fov-axis-landscape", _by_height, _says_axis, ((1.0,), (0.1,)), "power of the aspect",
+        applies=_landscape,
     ),
     Hypothesis(
         "last-pixel", _stretched,
