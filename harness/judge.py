@@ -29,18 +29,17 @@ from harness.measure.observables import (
     Observable,
 )
 from harness.measure.raymap import ProbeRays
+from harness.measure.statistics import Noise
 from harness.pairs import PairJudge
 from harness.plan import Form, PreparedCase
+from harness.preflight import Preflight
 from harness.probed import Probed
 from harness.record import Check, Curve, Diagnosis, Verdict
 from harness.renderers.base import Capability
 from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
+from harness.scene.resolved import ResolvedScene
 from harness.verdict import check_id, judge, unmeasured
-
-# The chance of a false alarm of one check of a sampled picture, over all of its means. A suite of
-# a hundred such checks cries wolf once in a hundred runs.
-FALSE_ALARM = 1e-4
 
 RAYS = {
     Observable.EXIT_POINT: ray_observables.exit_point,
@@ -198,9 +197,9 @@ class CaseJudge:
         n2 = Capability.RADIANCE_N2 in contender.capabilities
         if observable in IMAGE_OBSERVABLES:
             picture = self._results.picture(contender, plan.IMAGE)
-            level = FALSE_ALARM if preflight.noisy else None
+            noise = _noise(preflight, self._case.scene)
             return radiance.against_truth(
-                self._case.scene, picture, preflight.quantum, precision, level
+                self._case.scene, picture, preflight.quantum, precision, noise
             )
         probe = self._case.probe(spec.probe.partition("~")[0] if spec.probe else None)
         truth = self._probed.truth(probe, form)
@@ -213,7 +212,7 @@ class CaseJudge:
         pixels = self._probed.light(contender, probe, form)
         if observable in BOUNDARIES:
             return BOUNDARIES[observable](truth, pixels, preflight.quantum, preflight.noisy)
-        quantum, noise = preflight.quantum, FALSE_ALARM if preflight.noisy else None
+        quantum, noise = preflight.quantum, _noise(preflight, form.scene)
         if observable in ALL_LIGHT_OBSERVABLES:
             return total_light.all_light(truth, pixels, precision, quantum, noise, n2)
         if observable is Observable.BREWSTER_REFLECTANCE:
@@ -221,6 +220,13 @@ class CaseJudge:
         if noise is not None:
             return light_observables.sampled_path_weight(truth, pixels, noise, n2)
         return light_observables.path_weight(truth, pixels, precision, quantum, n2)
+
+
+def _noise(preflight: Preflight, scene: ResolvedScene) -> Noise | None:
+    """Of pictures that are held against the truth, which have as many samples as that takes."""
+    if preflight.samples is None:
+        return None
+    return Noise(plan.light_samples(scene, preflight.samples))
 
 
 def in_form(spec: model.CheckSpec, form: Form) -> model.CheckSpec:

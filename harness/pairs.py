@@ -132,6 +132,7 @@ class PairJudge:
                 self._results.picture(contender, plan.IMAGE),
                 self._results.picture(contender, plan.SECOND_IMAGE),
                 self._area, self._base, plan.AREA_FACTOR,
+                contender.ready().samples or 1,
             ).compare(Observable(spec.observable))  # fmt: skip
         except NotAvailable as gap:
             yield unmeasured(spec, contender.name, self._helper, gap.status, gap.reason)

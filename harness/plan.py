@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
+from harness.measure.statistics import samples_needed
 from harness.preflight import Preflight
 from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene
 from harness.renderers.base import Capability, RenderSettings
@@ -34,6 +35,11 @@ SECOND_IMAGE = "image, second seed"
 BASE_IMAGE = "unshifted"
 AREA_IMAGE = "area"
 SHIFTED = ("shifted left", "shifted right", "shifted up", "shifted down")
+# Samples per pixel of the picture of a path's light, by `samples_needed`.
+LIGHT_SAMPLES = samples_needed()
+# Where media absorb, a sample stands for the colour that it was drawn for: its value is up to 3 and
+# its variance 3 p - p^2, below 1 for all that coloured glass lets through.
+ABSORBED_SAMPLES = samples_needed(variance=1.0)
 # Samples per pixel side of the image that is averaged over pixel areas.
 AREA_FACTOR = 4
 
@@ -90,6 +96,11 @@ class PreparedCase:
     def wants_images(self) -> bool:
         """Whether any check looks at pictures."""
         return any(Observable(c.observable) in IMAGE_OBSERVABLES for c in self.loaded.model.checks)
+
+    @property
+    def wants_radiance(self) -> bool:
+        """Whether any check holds a picture against the truth."""
+        return any(c.observable == Observable.RADIANCE for c in self.loaded.model.checks)
 
     @property
     def compares_images(self) -> bool:
@@ -158,9 +169,10 @@ def jobs_of(
     scene = scene_for(case.scene, capabilities)
     jobs = []
     if case.wants_images:
-        jobs += _picture(case, Job(renderer, IMAGE, scene, settings))
+        asked = for_light(scene, settings, preflight) if case.wants_radiance else settings
+        jobs += _picture(case, Job(renderer, IMAGE, scene, asked))
         if preflight.noisy:
-            other = replace(settings, seed=settings.seed + 1)
+            other = replace(asked, seed=settings.seed + 1)
             jobs += _picture(case, Job(renderer, SECOND_IMAGE, scene, other))
     for form in case.forms:
         shown = scene_for(form.scene, capabilities)
@@ -168,10 +180,28 @@ def jobs_of(
             made = _probe_scenes(
                 shown, probe, form, capabilities, preflight, case.compares_rays(probe)
             )
+            asked = (
+                settings if probe.measure == "position" else for_light(shown, settings, preflight)
+            )
             jobs += [
-                Job(renderer, role, made_scene, settings, path) for role, made_scene, path in made
+                Job(renderer, role, made_scene, asked, path) for role, made_scene, path in made
             ]
     return jobs
+
+
+def light_samples(scene: ResolvedScene, samples: int) -> int:
+    """So many samples show that the light of `scene` is right; `samples` at least."""
+    absorbs = any(max(medium.absorption) > 0 for medium in scene.media)
+    return max(samples, ABSORBED_SAMPLES if absorbs else LIGHT_SAMPLES)
+
+
+def for_light(
+    scene: ResolvedScene, settings: RenderSettings, preflight: Preflight
+) -> RenderSettings:
+    """The settings of a picture that is held against the truth."""
+    if not preflight.noisy:
+        return settings
+    return replace(settings, samples=light_samples(scene, settings.samples))
 
 
 def _picture(case: PreparedCase, job: Job) -> list[Job]:

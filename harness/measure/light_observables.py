@@ -15,7 +15,7 @@ from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import nature, worst_level
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ProbeTruth
-from harness.measure.statistics import binned
+from harness.measure.statistics import Noise, binned
 from harness.probe.decode import lit_threshold
 from harness.renderers.base import Status
 
@@ -38,16 +38,13 @@ def path_weight(
 
 
 def sampled_path_weight(
-    truth: ProbeTruth, pixels: NDArray[np.float32], level: float, n2: bool
+    truth: ProbeTruth, pixels: NDArray[np.float32], noise: Noise, n2: bool
 ) -> Comparison:
-    """The same for a renderer that samples its lobes: means over bins of like angle.
-
-    `level` is the chance of a false alarm over all bins together.
-    """
+    """The same for a renderer that samples its lobes: means over bins of like angle."""
     true, used = _expected_level(truth, n2)
     rows = np.flatnonzero(used)
     order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
-    comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true, order, level)
+    comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true, order, noise)
     comparison.detail.update(nature(truth, used))
     return comparison
 

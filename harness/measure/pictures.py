@@ -20,6 +20,14 @@ from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.images import Mask, Pixels
 from harness.measure.observables import Observable
 from harness.measure.probe_truth import ROUNDINGS
+from harness.measure.statistics import (
+    FALSE_ALARM,
+    PICTURE_MARGIN,
+    REGIONS,
+    UNSURE,
+    Moments,
+    compare_regions,
+)
 
 GRAZING = 1e-3
 # More grazing pixels than this share would hide a wrong picture behind them. They are found on the
@@ -161,7 +169,8 @@ class SampledPicture:
     """A picture by a renderer that samples, twice with independent seeds, and what it estimates.
 
     `reference` is the mean over each pixel's area of a picture without noise, of `samples_a_side`
-    squared samples, and `center` the same picture at pixel centres.
+    squared samples, and `center` the same picture at pixel centres. `samples` is how many of its
+    own a pixel of one seed has.
     """
 
     first: Pixels
@@ -169,6 +178,7 @@ class SampledPicture:
     reference: Pixels
     center: Pixels
     samples_a_side: int
+    samples: int
 
     def compare(self, observable: Observable) -> Comparison | None:
         """None for observables that noise leaves without a bound."""
@@ -198,4 +208,22 @@ class SampledPicture:
                     "its own sampling error, from two seeds, and the error of the area means",
                     detail={"own_sampling_rmse": float(own), "reference_rmse": float(left)},
                 )  # fmt: skip
+            case Observable.MAX_DIFFERENCE:
+                return self._regions(data_range)
         return None
+
+    def _regions(self, data_range: float) -> Comparison:
+        """The largest difference of the means of regions of any size, by Welch's test."""
+        slack = area_error(self.center, self.samples_a_side)
+        exact = Moments(self.reference.astype(np.float64), np.zeros_like(slack), 1.0, slack)
+        sampled = Moments.of_two(self.first, self.second)
+        found = compare_regions(sampled, exact, FALSE_ALARM, data_range, 2 * self.samples)
+        return Comparison(
+            found.gap, 0.0, found.limit, found.gap <= found.limit,
+            f"Welch's t of the means of regions of {', '.join(map(str, REGIONS))} pixels a side, "
+            f"level {FALSE_ALARM:.2g} over all of them, and the error of the area means; regions "
+            f"of {REGIONS[-1]} pixels are within {PICTURE_MARGIN:g} of the brightest light at a "
+            f"level of {UNSURE:g}",
+            detail={"region": found.side, "worst_pixel_x": found.x, "worst_pixel_y": found.y,
+                    "channel": "rgb"[found.channel], "samples": 2 * self.samples},
+        )  # fmt: skip

@@ -15,7 +15,7 @@ from harness.measure.images import Pixels
 from harness.measure.pictures import geometric_error
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS
-from harness.measure.statistics import binned
+from harness.measure.statistics import Noise, binned
 from harness.renderers.base import Rays
 from harness.scene.resolved import (
     Checker,
@@ -156,12 +156,12 @@ def against_truth(
     picture: Pixels,
     quantum: float,
     precision: Precision,
-    noise_level: float | None,
+    noise: Noise | None,
 ) -> Comparison:
     """A picture against its closed form, pixel by pixel; edges within a renderer's error excluded.
 
-    With `noise_level` the picture is sampled over pixel areas: then pixels that an edge crosses are
-    excluded and means are judged, at that level.
+    With `noise` the picture is sampled over pixel areas: then pixels that an edge crosses are
+    excluded and means are judged.
     """
     true, edge = true_picture(scene)
     if picture.shape != true.shape:
@@ -170,9 +170,9 @@ def against_truth(
         raise Unmeasurable("the picture holds values that are not finite")
     extent = float(np.abs(np.array(scene.camera.origin)).max()) + 1
     stray = geometric_error(extent, len(scene.surfaces), precision.arithmetic)
-    if noise_level is not None:
+    if noise is not None:
         rows = np.flatnonzero(edge.ravel() > footprint(scene))
-        return binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise_level)
+        return binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise)
     keep = edge > stray
     error = np.abs(picture.astype(np.float64) - true).max(axis=-1)
     segments, cut = len(scene.surfaces) + 1, 0.0

@@ -15,7 +15,7 @@ from harness.measure.light_parts import distance_to_nature, worst_level
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.ray_parts import indices
-from harness.measure.statistics import binned
+from harness.measure.statistics import Noise, binned
 from harness.renderers.base import Status
 from harness.tree import light_on
 from harness.truth import ClosedForm
@@ -29,13 +29,13 @@ def all_light(
     pixels: NDArray[np.float32],
     precision: Precision,
     quantum: float,
-    noise_level: float | None,
+    noise: Noise | None,
     n2: bool,
 ) -> Comparison:
     """The light of all paths from the probe's plane, against the sum of the tree of closed forms.
 
     For a slab that is (1 - R)^2 a / (1 - R^2 a^2), cut where the scene's depth cuts it. With
-    `noise_level` a renderer samples, and means are judged; `n2`: its radiance scales with n^2.
+    `noise` a renderer samples, and means are judged; `n2`: its radiance scales with n^2.
     """
     scene = truth.scene
     transport = scene.transport
@@ -49,10 +49,10 @@ def all_light(
         "max_depth": transport.max_depth,
         "cut": float(light.cut[used].max()),
     }
-    if noise_level is not None:
+    if noise is not None:
         rows = np.flatnonzero(used)
         order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
-        comparison = binned(measured, true, order, noise_level)
+        comparison = binned(measured, true, order, noise)
         comparison.detail.update(detail)
         return comparison
     # Paths whose weight is the least to be followed may be followed by one and not by the other.
@@ -69,7 +69,7 @@ def brewster_reflectance(
     pixels: NDArray[np.float32],
     precision: Precision,
     quantum: float,
-    noise_level: float | None,
+    noise: Noise | None,
 ) -> Comparison:
     """Reflectance at Brewster's angle, where half the light is not reflected at all.
 
@@ -86,14 +86,14 @@ def brewster_reflectance(
     true, measured = truth.level[near, 1], pixels.reshape(-1, 3)[near, 1].astype(np.float64)
     bend = float(true.mean()) - closed
     value = float(measured.mean()) - bend
-    if noise_level is None:
+    if noise is None:
         tolerance = quantum + float((truth.level_tolerance(precision)[near] * true).max())
         said = "quantum of the image + 8 eps per rounding chain x condition of the reflectance"
     else:
         from scipy.special import stdtrit
 
         count = int(near.sum())
-        limit = -float(stdtrit(count - 1, noise_level / 2))
+        limit = -float(stdtrit(count - 1, noise.level / 2))
         tolerance = limit * float((measured - true).std(ddof=1)) / np.sqrt(count)
         said = f"{limit:.2f} standard errors of the mean of {count} pixels (Student's t)"
     return Comparison(

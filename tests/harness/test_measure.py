@@ -16,7 +16,7 @@ from harness.measure.precision import Precision
 from harness.measure.probe_truth import ProbeTruth, probe_truth
 from harness.measure.radiance import true_picture
 from harness.measure.rays import from_images, from_paths, surely_sampled
-from harness.measure.statistics import BIN, binned
+from harness.measure.statistics import BIN, Noise, binned
 from harness.probe.decode import Reason
 from harness.probe.scenes import AMPLITUDE, code_scene
 from harness.renderers.base import RayPaths, Status
@@ -97,7 +97,7 @@ def noisy(bias: float, seed: int, bins: int = 8) -> bool:
     rng = np.random.default_rng(seed)
     true = np.full((bins * BIN, 3), 0.5)
     value = true + bias + rng.normal(0, 0.1, true.shape)
-    return binned(value, true, np.arange(len(true)), 0.05).within
+    return binned(value, true, np.arange(len(true)), Noise(64, 0.05, 0.2)).within
 
 
 def test_false_alarms_are_as_rare_as_stated() -> None:
@@ -117,18 +117,18 @@ def test_a_bias_of_eight_standard_errors_is_always_seen() -> None:
 def test_what_cannot_be_binned_is_no_pass() -> None:
     value = np.zeros((BIN, 3))
     with pytest.raises(Unmeasurable, match="too few"):
-        binned(value[1:], value[1:], np.arange(BIN - 1), 0.05)
+        binned(value[1:], value[1:], np.arange(BIN - 1), Noise(64, 0.05))
     value[7, 1] = np.nan
     with pytest.raises(Unmeasurable, match="not finite"):
-        binned(value, np.zeros((BIN, 3)), np.arange(BIN), 0.05)
+        binned(value, np.zeros((BIN, 3)), np.arange(BIN), Noise(64, 0.05))
 
 
 def test_pixels_that_all_fell_alike_still_have_an_error() -> None:
     """Without scatter every deviation would be infinitely many standard errors."""
     value = np.zeros((BIN, 3))
-    found = binned(value, value + 1e-9, np.arange(BIN), 0.05)
+    found = binned(value, value + 1e-9, np.arange(BIN), Noise(64, 0.05))
     assert found.within
-    assert not binned(value, value + 0.1, np.arange(BIN), 0.05).within
+    assert not binned(value, value + 0.1, np.arange(BIN), Noise(64, 0.05)).within
 
 
 @given(st.integers(1, 4096), st.integers(1, 100_000))
