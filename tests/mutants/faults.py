@@ -213,6 +213,15 @@ class ThinOffset(Rules):  # 1 is right
         return self.a * shift
 
 
+@fault
+class Turned(Rules):  # refracted rays are turned by a radians away from the normal
+    def bend(self, d, n, ior_i, ior_t, entering, leg):
+        bent, total = by_ratio(d, n, ior_i / ior_t)
+        c, s, along = parts(bent, n)
+        theta = np.arctan2(s, -c) + self.a
+        return np.sin(theta)[:, None] * along - np.cos(theta)[:, None] * n, total
+
+
 # --- light ----------------------------------------------------------------------------------------
 
 
@@ -313,6 +322,13 @@ class OnePolarisation(Rules):  # the share of s; 1/2 is right
         s, p = super().polarised(cos_i, cos_t, ior_i, ior_t)
         mixed = self.a * s + (1 - self.a) * p
         return mixed, mixed
+
+
+@fault
+class FresnelOff(Rules):  # by a, of a light of 1
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        right = super().reflectance(cos_i, ior_i, ior_t, entering)
+        return np.where(right < 1, np.clip(right + self.a, 0, 1), 1.0)
 
 
 @fault

@@ -1,0 +1,248 @@
+"""Figures about detection: `make detection` writes docs/detection.md and docs/detection.json.
+
+    python -m tests.mutants.detection [PROCESSES]
+
+Every wrong renderer through the whole of snellcheck, right ones of all classes and the reference
+renderers beside them, the smallest faults that are seen, and what rules of other projects see.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness import __version__
+from harness.errors import RendererError
+from harness.expected import Float
+from harness.plan import prepare
+from harness.record import Summary, Verdict
+from harness.renderers import registry
+from harness.renderers.base import RenderSettings
+from harness.scene.load import find
+from tests.mutants.limits import CLASSES, QUESTIONS, Limit, limit
+from tests.mutants.mutants import CLEAN, CONTROLS, MUTANTS, UNLISTED, Mutant, outside_renderer
+from tests.mutants.rivals import RIVALS
+from tests.mutants.trial import RED, Trial, cases, run_alone, trial
+
+ROOT = Path(__file__).parents[2]
+DOCUMENT, DATA = ROOT / "docs" / "detection.md", ROOT / "docs" / "detection.json"
+PICTURES = Path(__file__).parent / "pictures"
+REFERENCES = ("tracer", "povray", "mitsuba-exact")
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """What was red of a renderer that is right."""
+
+    name: str
+    checks: int
+    red: tuple[str, ...]
+    absent: str = ""
+
+
+def _said(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
+
+
+# --- the parts ------------------------------------------------------------------------------------
+
+
+def try_one(mutant: Mutant) -> Trial:
+    """A wrong renderer with float images, by all cases."""
+    with tempfile.TemporaryDirectory() as folder:
+        found = trial(mutant, cases(), Path(folder))
+    verdict = "right" if found.right else "NOT RIGHT" if found.caught else "MISSED"
+    _said(f"{mutant.name}: {verdict}: {found.sentence[:160]}")
+    return found
+
+
+def alarms() -> Iterator[Alarm]:
+    """Right renderers: of all classes, those that only look wrong, and the reference renderers."""
+    chosen = cases()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for kind, options in {"float64, float images": {}, **CLASSES}.items():
+            renderer = outside_renderer(CLEAN, folder, **options)  # type: ignore[arg-type]
+            yield _alarm(f"the right renderer: {kind}", run_alone(renderer, chosen, folder / "out"))
+        for control in CONTROLS:
+            summary = run_alone(outside_renderer(control, folder), chosen, folder / "out")
+            yield _alarm(control.fault, summary)
+        for known in REFERENCES:
+            yield _alarm(known, run_alone(registry.create(known), chosen, folder / "out"))
+
+
+def _alarm(name: str, summary: Summary) -> Alarm:
+    checks = [(case.id, check) for case in summary.cases for check in case.checks]
+    red = tuple(f"{case} {check.observable}" for case, check in checks if check.status in RED)
+    made = sum(check.status in (Verdict.PASS, *RED) for _, check in checks)
+    (renderer,) = summary.renderers.values()
+    _said(f"{name}: {len(red)} of {made} red")
+    return Alarm(name, made, red, renderer.reason)
+
+
+def picture(mutant: Mutant) -> Float | None:
+    """The mutant's picture of everything at once; None where it is not to be had."""
+    scene = prepare(find((), PICTURES)[0]).scene
+    with tempfile.TemporaryDirectory() as folder:
+        renderer = outside_renderer(mutant, Path(folder))
+        try:
+            return np.asarray(renderer.render(scene, RenderSettings()).pixels, np.float64)
+        except RendererError:
+            return None
+        finally:
+            renderer.close()  # type: ignore[attr-defined]
+
+
+def seen_by_rivals(right: Float, mutant: Mutant) -> dict[str, bool | None]:
+    """By rule, whether it sees the mutant; an image that cannot be read is seen by all."""
+    wrong = picture(mutant)
+    return {name: True if wrong is None else rule(wrong, right) for name, rule in RIVALS.items()}
+
+
+# --- the document ---------------------------------------------------------------------------------
+
+
+def measure(workers: int) -> dict[str, Any]:
+    """Everything, as data."""
+    wrong = (*MUTANTS, *UNLISTED)
+    right = picture(CLEAN)
+    assert right is not None
+    with ProcessPoolExecutor(workers) as pool:
+        tried = pool.map(try_one, wrong)
+        rivals = pool.map(partial(seen_by_rivals, right), wrong)
+        limits = [pool.submit(limit, question, kind) for question in QUESTIONS for kind in CLASSES]
+        quiet = list(alarms())
+        return {
+            "schema": "snellcheck-detection/1",
+            "snellcheck_version": __version__,
+            "machine": f"{platform.system()} {platform.machine()}",
+            "checks": sum(len(case.loaded.model.checks) for case in cases()),
+            "mutants": [_trial_data(t) for t in tried],
+            "alarms": [
+                {"name": a.name, "checks": a.checks, "red": list(a.red), "absent": a.absent}
+                for a in quiet
+            ],
+            "limits": [_limit_data(found.result()) for found in limits],
+            "rivals": dict(zip((m.name for m in wrong), rivals, strict=True)),
+        }
+
+
+def _trial_data(t: Trial) -> dict[str, Any]:
+    return {
+        "name": t.mutant.name, "fault": t.mutant.fault, "amount": t.mutant.amount,
+        "source": t.mutant.source, "wanted": list(t.mutant.causes), "caught": t.caught,
+        "red": len(t.red), "cause": t.cause, "right": t.right, "sentence": t.sentence,
+        "value": t.value, "uncertainty": t.uncertainty,
+    }  # fmt: skip
+
+
+def _limit_data(found: Limit) -> dict[str, Any]:
+    question = found.question
+    return {
+        "what": question.what, "case": question.case, "unit": question.unit, "class": found.kind,
+        "amount": found.amount,
+    }  # fmt: skip
+
+
+def document(data: dict[str, Any]) -> str:
+    """docs/detection.md."""
+    mutants, rules = data["mutants"], list(RIVALS)
+    caught = sum(m["caught"] for m in mutants)
+    right = sum(m["right"] for m in mutants)
+    lines = [
+        "# What is seen, and what is said of it",
+        "",
+        "Generated by `make detection`; the same as data is in [detection.json](detection.json).",
+        f"Measured with snellcheck {data['snellcheck_version']} on {data['machine']}.",
+        "",
+        "Each wrong renderer is a correct one with one rule exchanged (`tests/mutants/`), run in a",
+        f"process of its own through the worker protocol, and held against {data['checks']} checks",
+        "of scenes that were made to tell faults apart (`tests/mutants/scenes/`).",
+        "",
+        f"- **{caught} of {len(mutants)}** wrong renderers turn red.",
+        f"- For **{right} of {len(mutants)}** ({right / len(mutants):.0%}) the first diagnosis is "
+        "right: it names the fault, or says that none of the known causes fits where that is so.",
+        f"- **{sum(len(a['red']) for a in data['alarms'])}** false alarms on right renderers.",
+        "",
+        "## Wrong renderers",
+        "",
+        "The last columns tell whether other projects' rules see the fault in a picture of a ball,",
+        "a coloured box, a ball of triangles and a prism before a checkerboard, compared with the",
+        "same renderer without the fault (`tests/mutants/rivals.py` states the rules).",
+        "",
+        "| fault | size | known from | checks red | diagnosis | right | "
+        + " | ".join(rules)
+        + " |",
+        "|--|--|--|--|--|--|" + "--|" * len(rules),
+    ]
+    for m in mutants:
+        seen = data["rivals"][m["name"]]
+        cells = [
+            m["fault"], f"{m['amount']:g}", m["source"], str(m["red"] or "none"),
+            _cell(m["sentence"]), "yes" if m["right"] else "**no**",
+            *("?" if seen[r] is None else "seen" if seen[r] else "–" for r in rules),
+        ]  # fmt: skip
+        lines.append("| " + " | ".join(cells) + " |")
+    seen_by = {rule: sum(bool(data["rivals"][m["name"]][rule]) for m in mutants) for rule in rules}
+    counts = ", ".join(f"{rule} {count}" for rule, count in seen_by.items())
+    lines += ["", f"Seen of {len(mutants)}: snellcheck {caught}, {counts}.", ""]
+    lines += _limit_lines(data) + _alarm_lines(data)
+    return "\n".join(lines) + "\n"
+
+
+def _cell(text: str) -> str:
+    """The sentence for a table: without what depends on the number of cases."""
+    return text.partition(": this explains")[0].replace("|", "\\|").replace("mutant ", "it ", 1)
+
+
+def _limit_lines(data: dict[str, Any]) -> list[str]:
+    kinds = list(CLASSES)
+    rows: dict[tuple[str, str, str], dict[str, float]] = {}
+    for found in data["limits"]:
+        key = (found["what"], found["case"], found["unit"])
+        rows.setdefault(key, {})[found["class"]] = found["amount"]
+    lines = [
+        "## The smallest faults that are seen",
+        "",
+        "By bisection over powers of two; half of each was not seen. `float32` keeps and computes",
+        "everything in single precision, `16 bits` and `8 bits` are what its files hold.",
+        "",
+        "| fault | case | unit | " + " | ".join(kinds) + " |",
+        "|--|--|--|" + "--|" * len(kinds),
+    ]
+    lines += [
+        f"| {what} | `{case}` | {unit} | " + " | ".join(f"{row[k]:.1e}" for k in kinds) + " |"
+        for (what, case, unit), row in rows.items()
+    ]
+    return [*lines, ""]
+
+
+def _alarm_lines(data: dict[str, Any]) -> list[str]:
+    lines = ["## Right renderers", "", "| renderer | checks | red |", "|--|--|--|"]
+    for alarm in data["alarms"]:
+        red = "; ".join(alarm["red"]) or ("none" if alarm["checks"] else f"– ({alarm['absent']})")
+        lines.append(f"| {alarm['name']} | {alarm['checks']} | {red} |")
+    return lines
+
+
+def main() -> None:
+    data = measure(int(sys.argv[1]) if len(sys.argv) > 1 else os.cpu_count() or 1)
+    DATA.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    DOCUMENT.write_text(document(data), encoding="utf-8")
+    _said(f"wrote {DOCUMENT.relative_to(ROOT)} and {DATA.relative_to(ROOT)}")
+
+
+if __name__ == "__main__":
+    main()
