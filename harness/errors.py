@@ -82,6 +82,10 @@ class RendererFailed(RendererError):
     """The renderer crashed, hung, ran out of memory or wrote something unreadable: ERROR."""
 
 
+class ConnectionLost(SnellcheckError):
+    """The machines that do the work cannot be reached any more: nothing can go on."""
+
+
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name closest to `name`, or None where nothing is close."""
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)

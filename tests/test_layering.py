@@ -40,7 +40,7 @@ LAYERS = (
     ("verdict", "preflight", "attribution"),
     ("report",),
     ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "remote", "cluster", "run"),
     ("doctor", "ci"),
     ("show", "cli", "pytest_plugin"),
 )
@@ -62,7 +62,10 @@ WORKER_ONLY = TRACER_ADAPTERS | {
 # What makes `snellcheck --help` slow, or can abort the process, is imported where it is used.
 HEAVY = {
     "colour",
+    "dask",
+    "distributed",
     "drjit",
+    "fsspec",
     "imagecodecs",
     "imageio",
     "matplotlib",
