@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
-from harness import bundle, plan
+from harness import bundle, plan, spectral
 from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
@@ -239,7 +239,8 @@ class Session:
     def _judge(self, index: int, state: _CaseState) -> None:
         contenders = self._contenders_of(state)
         film = state.case.scene.film
-        results = Results(state.results, film.width, film.height)
+        gathered = spectral.gathered(state.results, state.case.wavelengths)
+        results = Results(gathered, film.width, film.height)
         judgement = CaseJudge(state.case, contenders, results, self.helper).judge()
         written = self.storage.archive.write_case(
             state.case, contenders, results, judgement, state.seconds, self.settings,

@@ -119,7 +119,7 @@ class WorkerRenderer:
             if reply.closest is not None:
                 closest = delivered(reply.closest, scene.film, log=reply.log)[0][..., 0]
             seconds = reply.seconds or 0.0
-            return Image(pixels, variance, seconds, log, reply.command, closest)
+            return Image(pixels, variance, seconds, log, reply.command, closest, reply.cut)
 
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings

@@ -72,6 +72,7 @@ class PovRayRenderer:
             Capability.CONE,
             Capability.LENS,
             Capability.CONIC,
+            Capability.CSG,
             Capability.MESH,
             Capability.SMOOTH_MESH,
             Capability.MIRROR,
