@@ -42,8 +42,9 @@ LAYERS = (
     ("plan", "results", "probed", "pairs", "explain", "spectral", "judge"),
     ("baseline", "packing", "archive"),
     ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "remote", "cluster", "run"),
+    ("revision", "history", "bisect", "bisect_case"),
     ("doctor", "ci"),
-    ("show", "cli", "pytest_plugin"),
+    ("show", "show_history", "cli", "pytest_plugin"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 

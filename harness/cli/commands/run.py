@@ -11,9 +11,11 @@ import click
 from harness.cli.errors import reports_errors
 from harness.cli.options import (
     DEFAULT_OUT,
+    add_to_history,
     cache_option,
     command_option,
     config_option,
+    history_option,
     prepared_cases,
     quality_option,
     renderer_option,
@@ -70,6 +72,7 @@ from harness.cli.shards import divided
     metavar="URL|local:N",
     help="Render on the workers of a Dask scheduler, tcp://HOST:PORT, or on N of our own.",
 )
+@history_option
 @reports_errors
 def command(
     case: tuple[str, ...],
@@ -90,6 +93,7 @@ def command(
     shard: str | None,
     times: Path | None,
     cluster_at: str | None,
+    history: bool,
 ) -> None:
     """Render CASEs (all of them, or those a glob like "slab-*" selects) and judge them.
 
@@ -131,6 +135,8 @@ def command(
         click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)
     if note is not None:
         write_note(out, note)
+    if history and not summary.interrupted:
+        add_to_history(summary, out)
     index = write_report(out)
     show.verdicts(summary, index)
     sys.exit(summary.exit_code)
