@@ -127,8 +127,9 @@ class CaseJudge:
         """Those whom the check names, and who have what it is about."""
         api = Observable(spec.observable) in RAY_API_OBSERVABLES
         for contender in self._contenders:
-            named = not spec.renderers or contender.name in spec.renderers
-            if named and (not api or Capability.RAYS in contender.capabilities):
+            if plan.asks(spec, contender.name) and (
+                not api or Capability.RAYS in contender.capabilities
+            ):
                 yield contender
 
     def _in_all_forms(
