@@ -39,10 +39,11 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight", "attribution"),
     ("report",),
-    ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "run"),
-    ("doctor",),
-    ("show", "cli"),
+    ("plan", "results", "probed", "pairs", "explain", "spectral", "judge"),
+    ("baseline", "packing", "archive"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
+    ("doctor", "ci"),
+    ("show", "cli", "pytest_plugin"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 

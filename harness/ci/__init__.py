@@ -1,0 +1,1 @@
+"""What continuous integration systems read of a run: JUnit, Markdown, annotations."""
