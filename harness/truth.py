@@ -108,7 +108,8 @@ class ClosedForm:
             o = o + t[:, None] * d
             start = normals[:, k - 1] if k else None
             absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
-            facing = law.normal(np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n))
+            facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
+            facing = law.normal(facing, self._meshes[which])
             leaving = inside[which, rows] if bodies else live
             beyond = np.where(live, _beyond(bodies, which, leaving), 0)
             at = Interface(o, d, facing, ior[medium], ior[beyond], ~leaving, t, self._meshes[which])
