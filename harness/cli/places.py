@@ -19,31 +19,30 @@ class Place:
 
     cluster: Cluster | None = None
 
-    def renderers(
-        self, names: Sequence[str], commands: Sequence[str], configs: Sequence[Path]
+    def put(
+        self, chosen: Sequence[Renderer], commands: Sequence[str], configs: Sequence[Path]
     ) -> tuple[list[Renderer], Renderer]:
-        """The chosen renderers and the one that makes auxiliary pictures, chosen or not."""
-        from harness.cli.options import chosen_renderers
+        """The chosen renderers as they are here, and the one that makes auxiliary pictures.
+
+        `commands` and `configs` are what the user's own among them were made from.
+        """
+        from harness import remote
         from harness.renderers import registry
         from harness.run import HELPER
 
-        chosen = chosen_renderers(names, commands, configs)
-        helper = next((r for r in chosen if r.name == HELPER), None) or registry.create(HELPER)
         if self.cluster is None:
-            return chosen, helper
-        from harness import remote
-
-        origins = [remote.Origin("registered", one.name) for one in chosen]
-        mine = [remote.origin_of_command(template) for template in commands]
-        mine += [remote.origin_of_config(path) for path in configs]
-        origins[len(origins) - len(mine) :] = mine
-        there = [
-            self.cluster.renderer(one.name, origin)
-            for one, origin in zip(chosen, origins, strict=True)
-        ]
-        by_name = {one.name: one for one in there}
-        origin = remote.Origin("registered", HELPER)
-        return [*there], by_name.get(HELPER) or self.cluster.renderer(HELPER, origin)
+            helper = next((one for one in chosen if one.name == HELPER), None)
+            return list(chosen), helper or registry.create(HELPER)
+        origins = {registry.command_renderer(t).name: remote.origin_of_command(t) for t in commands}
+        origins |= {
+            registry.configured_renderer(p).name: remote.origin_of_config(p) for p in configs
+        }
+        there: dict[str, Renderer] = {}
+        for name in (*(one.name for one in chosen), HELPER):
+            if name not in there:
+                origin = origins.get(name, remote.Origin("registered", name))
+                there[name] = self.cluster.renderer(name, origin)
+        return [there[one.name] for one in chosen], there[HELPER]
 
     def threads(self, here: int) -> int:
         """Of one render: all of a machine's, or one where its cores have a worker each."""

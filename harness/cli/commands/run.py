@@ -13,9 +13,11 @@ from harness.cli.options import (
     DEFAULT_OUT,
     add_to_history,
     cache_option,
+    chosen_renderers,
     command_option,
     config_option,
     history_option,
+    named_by,
     prepared_cases,
     quality_option,
     renderer_option,
@@ -115,14 +117,17 @@ def command(
 
     cache, note = None if no_cache else open_cache(cache_at), None
     with show.progress() as progress, places(cluster_at) as place:
-        chosen, helper = place.renderers(renderers, commands, configs)
+        chosen = chosen_renderers(renderers, commands, configs)
         cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
+        if not renderers:
+            chosen += named_by(cases)
         if shard is not None:
             settings = f"{quality}, seed {seed}, stored {stored}"
             cases, note = divided(shard, cases, [r.name for r in chosen], settings, times, scenes)
         if fresh:
             shutil.rmtree(out / UNFINISHED, ignore_errors=True)
         (out / NOTE).unlink(missing_ok=True)
+        chosen, helper = place.put(chosen, commands, configs)
         with terminable():
             summary = run_cases(
                 cases, chosen, helper, out, quality=quality, seed=seed,
