@@ -62,6 +62,7 @@ export class Viewer {
     });
     this.element = h("div", { class: "viewer", tabindex: 0, role: "group",
       "aria-label": "Picture viewer; press ? for its keys" },
+      h("h2", { class: "hidden" }, "Viewer"),
       this.controls.element,
       h("div", { class: "viewer-body" },
         h("div", { class: "stage-column" }, this.stage, this.controls.slider, this.bar, this.notice),
