@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Literal
 
 import pytest
 
 pytest.importorskip("playwright.sync_api", reason="uv pip install playwright")
-axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+pytest.importorskip("axe_playwright_python.sync_playwright")
 
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page
 
-from harness import record as records
 from harness.record import BaselineState
 from harness.renderers.registry import create
 from harness.report import write_report
@@ -66,7 +65,7 @@ def eye(browser: Browser, request: pytest.FixtureRequest) -> Iterator[Page]:
 
 
 def findings(page: Page) -> list[str]:
-    violations = axe.Axe().run(page).response["violations"]
+    violations = Axe().run(page).response["violations"]
     return [
         f"{v['id']} ({v['impact']}): {v['help']}: {node['html'][:160]}"
         for v in violations
