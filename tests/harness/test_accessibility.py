@@ -1,4 +1,4 @@
-"""Can everybody read the report? axe-core on every kind of page, light and dark, wide and narrow."""
+"""Can everybody read the report? axe-core on all kinds of pages, light, dark, wide and narrow."""
 
 from __future__ import annotations
 

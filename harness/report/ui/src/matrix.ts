@@ -1,5 +1,6 @@
 // The index: filter chips, search, sorting, and where all of that stands in the address.
 
+import { readAddress, writeAddress } from "./address";
 import { bind } from "./keys";
 
 interface Row {
@@ -94,8 +95,8 @@ export function startMatrix(): void {
   }
 
   function recall(): void {
-    if (!location.hash.includes("=")) return;
-    const hash = new URLSearchParams(location.hash.slice(1));
+    const hash = new URLSearchParams(readAddress());
+    if (!hash.size) return;
     search!.value = hash.get("q") ?? "";
     for (const chip of chips) {
       const on = hash.getAll(chip.dataset["filter"] ?? "").includes(chip.dataset["value"] ?? "");
@@ -163,8 +164,5 @@ function remember(state: Record<string, string[]>): void {
   for (const [key, values] of Object.entries(state)) {
     for (const value of values) if (value) hash.append(key, value);
   }
-  const text = hash.toString();
-  if (text || location.hash.includes("=")) {
-    history.replaceState(null, "", text ? `#${text}` : location.pathname);
-  }
+  writeAddress(hash.toString());
 }

@@ -1,5 +1,6 @@
 // The viewer of a case: pictures under one camera, in the mode that the state names.
 
+import { readAddress, writeAddress } from "./address";
 import type { CaseData } from "./case";
 import { type Encoding, type Scale, shadeFigures, shadeRadiance } from "./colour";
 import { colourBar } from "./colourbar";
@@ -48,10 +49,10 @@ export class Viewer {
     this.names = [...this.images.keys()];
     const [first = "", second = first] = this.preferred();
     this.initial = {
-      mode: "side", a: second, b: first, every: true, exposure: 0, encoding: "srgb",
+      mode: "side", a: second, b: this.before(second) ?? first, every: true, exposure: 0, encoding: "srgb",
       camera: null, pins: [],
     };
-    this.state = fromHash(location.hash, this.initial, this.names);
+    this.state = fromHash(readAddress(), this.initial, this.names);
     this.inspector = new Inspector((pixel) => this.jump(pixel), () => this.unpin());
     this.rayPanel = new RayPanel(rays, data.colours);
     this.controls = new Controls(this.names, rays.length > 0, {
@@ -80,15 +81,24 @@ export class Viewer {
 
   /** The tracer, if it took part, is what others are compared with at first; the worst is A. */
   private preferred(): string[] {
-    const rank = (name: string): number =>
-      ({ fail: 0, error: 1, known: 2 })[this.data.verdicts[name] ?? ""] ?? 3;
+    const rank = (name: string): number => {
+      const suspected = this.data.suspects.indexOf(name);
+      const verdict = ({ fail: 0, error: 1, known: 2 })[this.data.verdicts[name] ?? ""] ?? 3;
+      return suspected < 0 ? 100 + verdict : suspected;
+    };
     const base = this.names.find((n) => n === "tracer") ?? this.names[0] ?? "";
     const others = this.names.filter((n) => n !== base).sort((p, q) => rank(p) - rank(q));
     return [base, ...others];
   }
 
+  /** In a comparison of two runs, the same renderer's picture of the run before. */
+  private before(name: string): string | undefined {
+    const other = this.data.packs.find((pack) => pack.prefix)?.prefix;
+    return this.names.find((n) => other !== undefined && n === other + name);
+  }
+
   private restore(): void {
-    this.state = fromHash(location.hash, this.initial, this.names);
+    this.state = fromHash(readAddress(), this.initial, this.names);
     this.rebuild();
   }
 
@@ -103,9 +113,7 @@ export class Viewer {
   private remember(): void {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
-      const text = toHash(this.state, this.initial);
-      if (!text && !location.hash.includes("=")) return;
-      history.replaceState(null, "", text ? `#${text}` : location.pathname + location.search);
+      writeAddress(toHash(this.state, this.initial));
     }, 150);
   }
 
