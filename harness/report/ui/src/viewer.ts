@@ -8,6 +8,7 @@ import { colourBar } from "./colourbar";
 import { Controls } from "./controls";
 import { h, reducedMotion } from "./dom";
 import { number } from "./format";
+import { firstPair } from "./firstpair";
 import { Inspector } from "./inspector";
 import { arranged } from "./layout";
 import { MAPS } from "./maps";
@@ -51,9 +52,8 @@ export class Viewer {
   ) {
     this.images = new Map(images.map((image) => [image.name, image]));
     this.names = [...this.images.keys()];
-    const [first = "", second = first] = this.preferred();
     this.initial = {
-      mode: "side", a: second, b: this.before(second) ?? first, every: true, exposure: 0, encoding: "srgb",
+      mode: "side", ...firstPair(data, this.names), every: true, exposure: 0, encoding: "srgb",
       camera: null, pins: [],
     };
     this.state = fromHash(readAddress(), this.initial, this.names);
@@ -92,24 +92,6 @@ export class Viewer {
       if (location.hash.includes("=") || location.hash === "") this.restore();
     });
     this.rebuild();
-  }
-
-  /** The tracer, if it took part, is what others are compared with at first; the worst is A. */
-  private preferred(): string[] {
-    const rank = (name: string): number => {
-      const suspected = this.data.suspects.indexOf(name);
-      const verdict = ({ fail: 0, error: 1, known: 2 })[this.data.verdicts[name] ?? ""] ?? 3;
-      return suspected < 0 ? 100 + verdict : suspected;
-    };
-    const base = this.names.find((n) => n === "tracer") ?? this.names[0] ?? "";
-    const others = this.names.filter((n) => n !== base).sort((p, q) => rank(p) - rank(q));
-    return [base, ...others];
-  }
-
-  /** In a comparison of two runs, the same renderer's picture of the run before. */
-  private before(name: string): string | undefined {
-    const other = this.data.packs.find((pack) => pack.prefix)?.prefix;
-    return this.names.find((n) => other !== undefined && n === other + name);
   }
 
   private restore(): void {
