@@ -37,9 +37,8 @@ def test_a_single_file_opens_its_cases_with_pixels(page: Page, run: Path, tmp_pa
     assert page.locator("h1").inner_text() == "A glass ball before a ramp"
     assert page.locator(".pane canvas").count() == 2
     page.keyboard.press("d")
-    page.wait_for_timeout(250)
+    page.wait_for_url(lambda url: "mode=diff" in url)
     assert "page=cases" in page.url
-    assert "mode=diff" in page.url
     page.reload()
     page.wait_for_selector("#viewer[data-ready]")
     assert page.locator(".pane canvas").first.get_attribute("aria-label", timeout=5000)
