@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references test lint format lock ui clean
+.PHONY: help setup suite catalogue references findings test lint stress format lock ui bench clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -21,6 +21,10 @@ references: setup ## Measure the committed baselines anew: make references REASO
 	@$(BIN)/snellcheck run --no-stored --out reports/references
 	@$(BIN)/snellcheck approve '*' --run reports/references --reason "$(REASON)"
 
+findings: setup ## Run the catalogue and write docs/findings.md from its records
+	@$(BIN)/snellcheck run --out reports/findings || test $$? -eq 1
+	@$(BIN)/snellcheck findings reports/findings --out docs/findings.md
+
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2
 
@@ -28,6 +32,10 @@ lint: setup ## Check style and types
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/mypy
+
+stress: setup ## Make faults on purpose, many of each, and write docs/reliability.md
+	@SNELLCHECK_STRESS=reports/stress $(BIN)/python -m pytest -q tests/stress
+	@$(BIN)/python scripts/reliability reports/stress
 
 format: setup ## Mend what of the style can be mended by a program
 	@$(BIN)/ruff check --fix --quiet
@@ -38,6 +46,9 @@ lock: ## Rebuild requirements/*.txt from pyproject.toml (UPGRADE=1: newer versio
 
 ui: ## Rebuild the report's script from harness/report/ui (needs Node)
 	@cd harness/report/ui && npm ci --silent && npm run --silent build
+
+bench: setup ## Measure the tracer's speed and write reports/bench.json and bench.svg
+	@$(BIN)/python -m tests.bench $(ARGS)
 
 clean: ## Remove the environment, caches and reports
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -15,6 +15,7 @@ from harness.explain import Explainer
 from harness.measure import (
     flat_observables,
     focus_observables,
+    furnace,
     light_observables,
     radiance,
     ray_observables,
@@ -62,6 +63,7 @@ RAYS = {
     Observable.BACK_FOCAL_LENGTH: focus_observables.back_focal_length,
     Observable.SPHERICAL_ABERRATION: focus_observables.spherical_aberration,
     Observable.APLANATIC_IMAGE: focus_observables.aplanatic_image,
+    Observable.CARTESIAN_FOCUS: focus_observables.cartesian_focus,
     Observable.RAINBOW_ANGLE: focus_observables.rainbow_angle,
     Observable.OPTICAL_LENGTH: optical_length,
 }
@@ -125,8 +127,9 @@ class CaseJudge:
         """Those whom the check names, and who have what it is about."""
         api = Observable(spec.observable) in RAY_API_OBSERVABLES
         for contender in self._contenders:
-            named = not spec.renderers or contender.name in spec.renderers
-            if named and (not api or Capability.RAYS in contender.capabilities):
+            if plan.asks(spec, contender.name) and (
+                not api or Capability.RAYS in contender.capabilities
+            ):
                 yield contender
 
     def _in_all_forms(
@@ -197,6 +200,9 @@ class CaseJudge:
         n2 = Capability.RADIANCE_N2 in contender.capabilities
         if observable in IMAGE_OBSERVABLES:
             picture = self._results.picture(contender, plan.IMAGE)
+            if furnace.is_furnace(self._case.scene):
+                own = None if preflight.samples is None else Noise(preflight.samples)
+                return furnace.energy(self._case.scene, picture, preflight.quantum, precision, own)
             noise = _noise(preflight, self._case.scene)
             return radiance.against_truth(
                 self._case.scene, picture, preflight.quantum, precision, noise

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
+from harness.measure.furnace import is_furnace
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.measure.statistics import samples_needed
 from harness.preflight import Preflight
-from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene
+from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene, ramp_scene
+from harness.renderers import registry
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene import model
 from harness.scene.findings import SceneInvalid, input_error
@@ -55,6 +57,13 @@ class Job:
     path: str | None = None
 
 
+def asks(check: model.CheckSpec, renderer: str) -> bool:
+    """Whether a check is about `renderer`."""
+    if renderer in registry.ONLY_WHERE_NAMED:
+        return renderer in check.renderers
+    return not check.renderers or renderer in check.renderers
+
+
 @dataclass(frozen=True)
 class Form:
     """A case as its file has it, name "", or one of its variants; lengths are `scale` as large.
@@ -92,15 +101,23 @@ class PreparedCase:
         probes = self.loaded.model.probes
         return (Form("", self.scene, {p.name: probe_planes(p) for p in probes}), *self.variants)
 
-    @property
-    def wants_images(self) -> bool:
-        """Whether any check looks at pictures."""
-        return any(Observable(c.observable) in IMAGE_OBSERVABLES for c in self.loaded.model.checks)
+    def wants_image(self, renderer: str) -> bool:
+        """Whether any check looks at a picture by `renderer`."""
+        checks = self.loaded.model.checks
+        return any((Observable(c.observable) in IMAGE_OBSERVABLES and asks(c, renderer))
+                   or c.against == renderer for c in checks)  # fmt: skip
+
+    def asked_probes(self, renderer: str) -> list[model.Probe]:
+        """The probes that checks of `renderer` need."""
+        used = {c.probe for c in self.loaded.model.checks if asks(c, renderer)}
+        return [probe for probe in self.loaded.model.probes if probe.name in used]
 
     @property
     def wants_radiance(self) -> bool:
-        """Whether any check holds a picture against the truth."""
-        return any(c.observable == Observable.RADIANCE for c in self.loaded.model.checks)
+        """Whether a check holds a picture with noise against the truth; a furnace has none."""
+        checks = self.loaded.model.checks
+        radiance = any(c.observable == Observable.RADIANCE for c in checks)
+        return radiance and not is_furnace(self.scene)
 
     @property
     def compares_images(self) -> bool:
@@ -168,7 +185,7 @@ def jobs_of(
     """All jobs that `renderer` must do for `case`."""
     scene = scene_for(case.scene, capabilities)
     jobs = []
-    if case.wants_images:
+    if case.wants_image(renderer):
         asked = for_light(scene, settings, preflight) if case.wants_radiance else settings
         jobs += _picture(case, Job(renderer, IMAGE, scene, asked))
         if preflight.noisy:
@@ -176,7 +193,7 @@ def jobs_of(
             jobs += _picture(case, Job(renderer, SECOND_IMAGE, scene, other))
     for form in case.forms:
         shown = scene_for(form.scene, capabilities)
-        for probe in case.loaded.model.probes:
+        for probe in case.asked_probes(renderer):
             made = _probe_scenes(
                 shown, probe, form, capabilities, preflight, case.compares_rays(probe)
             )
@@ -244,6 +261,22 @@ def _probe_scenes(
         for axis in AXES:
             coded = code_scene(scene, plane, axis, cells, probe.path, probe.total_reflection)
             yield code_role(probe, index, axis, form.name), coded, None
+
+
+def shown_to(
+    case: PreparedCase, probe_name: str | None, capabilities: Collection[Capability]
+) -> ResolvedScene:
+    """The scene that shows what a probe measures, to look at; without a probe the case's own."""
+    scene = scene_for(case.scene, capabilities)
+    if probe_name is None:
+        return scene
+    probe = case.probe(probe_name)
+    plane = case.planes(probe)[0]
+    if probe.measure == "all-light":
+        return all_light_scene(scene, plane)
+    if probe.measure == "light":
+        return light_scene(scene, plane, probe.path)
+    return ramp_scene(scene, plane, probe.path, probe.total_reflection)
 
 
 def auxiliary_jobs(

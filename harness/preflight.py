@@ -83,7 +83,27 @@ class Preflight:
             "code_cells": self.cells,
             "position_resolution": self.position_error,
             "epsilon": self.epsilon,
+            "values": stored_as(self.quantum),
+            "noise": f"{self.samples} samples per pixel" if self.samples is not None else "none",
         }
+
+
+# Half a step of the formats that images are stored in, and twice that, where a value between 0 and
+# 1 is rounded worst: linear 8 and 16 bits, and half floats just below 1.
+FORMATS = {"16 bits": 0.5 / 65535, "half floats": 2.0**-12, "8 bits": 0.5 / 255}
+
+
+def stored_as(quantum: float) -> str:
+    """The format, in words, whose rounding is what a renderer's values are off by."""
+    if not np.isfinite(quantum):
+        return "unknown"
+    if quantum <= 8 * FLOAT32:
+        return "floats"
+    for name, step in FORMATS.items():
+        if step / 1.5 < quantum < 1.5 * step:
+            return name
+    # sRGB is steeper where it is dark, and flatter where it is bright.
+    return "8 bits, not linear" if quantum > FORMATS["8 bits"] / 4 else "of no known format"
 
 
 def preflight(

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from harness.plan import PreparedCase
+    from harness.record import Summary
     from harness.renderers.base import Renderer
     from harness.scene.load import LoadedCase
 
@@ -42,6 +43,21 @@ cache_option = click.option(
     help="Where results are kept from run to run.  [default: the user's cache folder]",
 )  # fmt: skip
 
+history_option = click.option(
+    "--history/--no-history", "history", default=True, show_default=True,
+    help="Add the figures to the history of past runs.",
+)  # fmt: skip
+
+
+def add_to_history(summary: Summary, out: Path) -> None:
+    """Adds a run to the user's history, or says why it could not."""
+    from harness.history import History, history_file
+    from harness.revision import revision
+
+    trouble = History(history_file()).add(summary, revision(Path.cwd()), out)
+    if trouble:
+        click.secho(f"warning: {trouble}", fg="yellow", err=True)
+
 
 def loaded_cases(
     selection: Sequence[str],
@@ -71,10 +87,23 @@ def prepared_cases(
 def chosen_renderers(
     names: Sequence[str], commands: Sequence[str], configs: Sequence[Path]
 ) -> list[Renderer]:
-    """Those named; without names the built-in ones, and in any case the user's own."""
+    """Those named; without names the registered ones, and in any case the user's own.
+
+    Renderers that only some scenes are about are left to `named_by`.
+    """
     from harness.renderers import registry
 
     own = [registry.command_renderer(template) for template in commands]
     own += [registry.configured_renderer(path) for path in configs]
-    chosen = list(names) or sorted(registry.available())
+    chosen = list(names) or sorted(registry.available().keys() - registry.ONLY_WHERE_NAMED)
     return [*(registry.create(name) for name in chosen), *own]
+
+
+def named_by(cases: Sequence[PreparedCase]) -> list[Renderer]:
+    """The renderers that are asked only where a check names them, where one of `cases` does."""
+    from harness.renderers import registry
+
+    checks = (check for case in cases for check in case.loaded.model.checks)
+    named = {name for check in checks for name in check.renderers}
+    available = registry.ONLY_WHERE_NAMED & named & registry.available().keys()
+    return [registry.create(name) for name in sorted(available)]
