@@ -25,6 +25,9 @@ findings: setup ## Run the catalogue and write docs/findings.md from its records
 	@$(BIN)/snellcheck run --out reports/findings || test $$? -eq 1
 	@$(BIN)/snellcheck findings reports/findings --out docs/findings.md
 
+detection: setup ## Measure what is seen of wrong renderers, and write docs/detection.md (an hour)
+	@$(BIN)/python -m tests.mutants.detection
+
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2
 

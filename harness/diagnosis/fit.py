@@ -100,9 +100,32 @@ def _nowhere(evidence: Sequence[Evidence]) -> _Point:
     return _Point(gaps, squares, rays, sum(rays) / 2 * float(np.log1p(LARGEST**2)))
 
 
-def cost_of(worlds: Sequence[World], evidence: Sequence[Evidence]) -> float:
-    """What it costs to explain the evidence by these worlds, one for each piece."""
-    return _point(worlds, evidence).score
+def _concerned(hypothesis: Hypothesis, evidence: Sequence[Evidence]) -> list[tuple[World, bool]]:
+    """The right worlds, and whether the hypothesis changes them; [] where it changes none."""
+    right = [World.right(piece.setting) for piece in evidence]
+    found = [(world, hypothesis.applies(world)) for world in right]
+    return found if any(mine for _, mine in found) else []
+
+
+def _at(
+    hypothesis: Hypothesis,
+    values: Values,
+    right: Sequence[tuple[World, bool]],
+    evidence: Sequence[Evidence],
+    trimmed: float = TRIMMED,
+) -> _Point:
+    try:
+        with np.errstate(all="ignore"):
+            worlds = [hypothesis.world(world, values) if mine else world for world, mine in right]
+        return _point(worlds, evidence, trimmed)
+    except ArithmeticError:  # what is no number is no fit
+        return _nowhere(evidence)
+
+
+def cost_of(hypothesis: Hypothesis, values: Values, evidence: Sequence[Evidence]) -> float | None:
+    """What it costs to explain the evidence so; None where it does not concern the hypothesis."""
+    right = _concerned(hypothesis, evidence)
+    return _at(hypothesis, values, right, evidence).score if right else None
 
 
 def truth_fit(evidence: Sequence[Evidence], trimmed: float = TRIMMED) -> _Point:
@@ -122,21 +145,12 @@ def fit(
     `trimmed` is the share of rays that may be anything. None where the hypothesis says nothing
     about any of the evidence.
     """
-    right = [World.right(piece.setting) for piece in evidence]
-    concerned = [hypothesis.applies(world) for world in right]
-    if not any(concerned):
+    right = _concerned(hypothesis, evidence)
+    if not right:
         return None
 
     def at(values: Values) -> _Point:
-        try:
-            with np.errstate(all="ignore"):
-                worlds = [
-                    hypothesis.world(world, values) if mine else world
-                    for world, mine in zip(right, concerned, strict=True)
-                ]
-            return _point(worlds, evidence, trimmed)
-        except ArithmeticError:  # what is no number is no fit
-            return _nowhere(evidence)
+        return _at(hypothesis, values, right, evidence, trimmed)
 
     tried = sorted(((at(start), start) for start in hypothesis.starts), key=lambda t: t[0].score)
     if not hypothesis.size or not hypothesis.continuous:

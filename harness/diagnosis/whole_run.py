@@ -18,7 +18,6 @@ from harness.diagnosis.evidence import Evidence
 from harness.diagnosis.fit import cost_of
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
 from harness.diagnosis.library import LIBRARY
-from harness.diagnosis.worlds import World
 from harness.record import Cause, CauseFit, Diagnosis
 
 # Of a case's gain by its own best parameter, so much may be lost by the common one.
@@ -126,11 +125,9 @@ def _held_against(common: _Common, witnesses: Sequence[Witness]) -> _Common:
     """Adds what it costs where a hypothesis predicts a deviation that is not there."""
     hypothesis, extra, broken = common.hypothesis, 0.0, []
     for witness in witnesses:
-        right = [World.right(piece.setting) for piece in witness.evidence]
-        if not any(hypothesis.applies(world) for world in right):
+        cost = cost_of(hypothesis, common.values, witness.evidence)
+        if cost is None:
             continue
-        worlds = [hypothesis.world(w, common.values) if hypothesis.applies(w) else w for w in right]
-        cost = cost_of(worlds, witness.evidence)
         if cost > SAME + sum(len(piece.setting.pixel) for piece in witness.evidence) / 2:
             broken.append(witness.case)
             extra += cost
