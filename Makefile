@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references test lint format lock ui clean
+.PHONY: help setup suite catalogue references test fuzz lint format lock ui clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -23,6 +23,9 @@ references: setup ## Measure the committed baselines anew: make references REASO
 
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2
+
+fuzz: setup ## Read 27,000 malformed files; the figures go to docs/reliability.md
+	@$(BIN)/python -W ignore -m tests.fuzz $(SEED)
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check --quiet
