@@ -200,6 +200,7 @@ class Archive:
                     height=height,
                     mean=mean,
                     mean_error=mean_error,
+                    cut=_cut(mine.get(role)),
                 )
             )
         return files
@@ -248,6 +249,10 @@ def _from_here(file: Path) -> str:
     path = file.absolute()
     here = Path.cwd()
     return (path.relative_to(here) if path.is_relative_to(here) else path).as_posix()
+
+
+def _cut(result: object) -> float | None:
+    return result.cut if isinstance(result, Image) else None
 
 
 def _shown(case: PreparedCase, mine: Mapping[str, object]) -> Iterator[tuple[str, Pixels]]:

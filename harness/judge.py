@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from harness import plan
+from harness import plan, spectral
 from harness.attribution import attributed
 from harness.explain import Explainer
 from harness.measure import (
@@ -95,7 +95,8 @@ class CaseJudge:
         self, case: PreparedCase, contenders: list[Contender], results: Results, helper: str
     ) -> None:
         self._case, self._contenders, self._results = case, contenders, results
-        self._pairs = PairJudge(case.scene, results, helper)
+        gain = spectral.gain(case.wavelengths)
+        self._pairs = PairJudge(case.scene, results, helper, gain)
         self._probed = Probed(case, results)
 
     def judge(self) -> Judgement:

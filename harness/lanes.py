@@ -23,11 +23,12 @@ from harness.camera import primary_rays
 from harness.errors import RendererError, RendererFailed, RendererMissing
 from harness.memo import Memo, memo_of
 from harness.plan import Job
-from harness.preflight import preflight
+from harness.preflight import Render, preflight
 from harness.record import Verdict
-from harness.renderers.base import RayTracingRenderer, Renderer, RenderSettings
+from harness.renderers.base import Image, RayTracingRenderer, Renderer, RenderSettings
 from harness.renderers.process_tree import Running, belong_to
 from harness.results import Contender, Result
+from harness.scene.resolved import ResolvedScene
 
 # With less room than this in the temporary folder, a failure to write is the disk's.
 SPARE_BYTES = 16 * 2**20
@@ -126,7 +127,7 @@ class Lane:
             return Calibrated(known, self._memo, reused=True)
         remedy = ""
         try:
-            contender = calibrate(self.renderer, self.settings)
+            contender = calibrate(self.renderer, self.settings, self._render)
             if contender.absent is Verdict.SKIP:
                 remedy = self.renderer.health().remedy
         except ANYTHING as error:
@@ -134,6 +135,16 @@ class Lane:
             contender = _out(self.renderer.name, Verdict.ERROR, reason)
         self._memo.keep_calibration(self.settings, contender)
         return Calibrated(contender, self._memo, remedy=remedy)
+
+    def _render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
+        """An image for the calibration, which a run that was killed may have made before."""
+        job = Job(self.renderer.name, "calibration", scene, settings)
+        if (known := self._memo.result(job)) is not None and isinstance(known.result, Image):
+            return known.result
+        start = time.perf_counter()
+        image = self.renderer.render(scene, settings)
+        self._memo.keep(job, image, time.perf_counter() - start)
+        return image
 
     def _perform(self, case: int, job: Job) -> Done:
         if (known := self._memo.result(job)) is not None:
@@ -180,7 +191,9 @@ def _blame_the_disk(failure: RendererFailed) -> None:
         raise OSError(errno.ENOSPC, why, folder)
 
 
-def calibrate(renderer: Renderer, settings: RenderSettings) -> Contender:
+def calibrate(
+    renderer: Renderer, settings: RenderSettings, render: Render | None = None
+) -> Contender:
     """The renderer as the judge sees it: out where it is missing, fails, or fails its preflight."""
     name = renderer.name
     try:
@@ -190,7 +203,7 @@ def calibrate(renderer: Renderer, settings: RenderSettings) -> Contender:
     except RendererError as error:
         return _out(name, Verdict.ERROR, f"failed to start: {error}{_tail(error)}")
     try:
-        found = preflight(renderer, settings)
+        found = preflight(renderer, settings, render)
     except RendererMissing as error:
         return _out(name, Verdict.SKIP, f"not installed: {error}")
     except RendererError as error:

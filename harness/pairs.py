@@ -49,8 +49,11 @@ def camera_shift(scene: ResolvedScene) -> float:
 class PairJudge:
     """Compares pictures of one case; what every pair shares is computed once."""
 
-    def __init__(self, scene: ResolvedScene, results: Results, helper: str) -> None:
-        self._scene, self._results, self._helper = scene, results, helper
+    def __init__(
+        self, scene: ResolvedScene, results: Results, helper: str, gain: float = 1.0
+    ) -> None:
+        """`gain` is by how much the error of a renderer's image shows in the picture."""
+        self._scene, self._results, self._helper, self._gain = scene, results, helper, gain
         self._made: dict[tuple[str, str], PicturePair] = {}
 
     def checks(
@@ -148,7 +151,7 @@ class PairJudge:
             cut = 2 * transport.min_weight * transport.max_depth
             epsilon = max(a.ready().epsilon, b.ready().epsilon)
             rounding = ROUNDINGS * epsilon / 2 * transport.max_depth
-            floor = a.ready().quantum + b.ready().quantum + cut + rounding
+            floor = self._gain * (a.ready().quantum + b.ready().quantum + cut + rounding)
             grazing = change > GRAZING
             if not all(Capability.DOUBLE in c.capabilities for c in (a, b)):
                 grazing = grazing | (self._closest < STEP_OFF)

@@ -25,7 +25,7 @@ from harness.renderers.base import Capability, Image, RayPaths, RenderSettings
 from harness.results import Contender, Result
 from harness.scene.resolved import ResolvedScene
 
-LAYOUT = 1  # of parcels; part of every key
+LAYOUT = 2  # of parcels; part of every key
 _LEVEL = 3  # of zstd; higher ones take longer than a render for a few percent
 _ERRORS: dict[str, type[RendererError]] = {
     "failed": RendererFailed,
@@ -73,7 +73,7 @@ def pack_result(result: Result) -> Parcel:
     if isinstance(result, Image):
         meta: dict[str, Any] = {
             "kind": "image", "seconds": result.seconds, "log": result.log,
-            "command": result.command,
+            "command": result.command, "cut": result.cut,
         }  # fmt: skip
         names = _IMAGE
     else:
@@ -96,7 +96,8 @@ def unpack_result(parcel: Parcel) -> Result:
     }
     if meta["kind"] == "image":
         return Image(
-            **arrays, seconds=meta["seconds"], log=meta["log"], command=meta["command"]
+            **arrays, seconds=meta["seconds"], log=meta["log"], command=meta["command"],
+            cut=meta["cut"],
         )  # fmt: skip
     return RayPaths(**arrays)
 

@@ -16,11 +16,12 @@ from harness.renderers.base import Capability, RenderSettings
 from harness.scene import model
 from harness.scene.findings import SceneInvalid, input_error
 from harness.scene.load import LoadedCase
-from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve
+from harness.scene.resolve import expand_thin_slabs, probe_planes, resolve, spectral_media
 from harness.scene.resolved import (
     Constant,
     Emissive,
     Film,
+    Medium,
     Rectangle,
     ResolvedScene,
     Surface,
@@ -63,11 +64,21 @@ class Form:
 
 @dataclass(frozen=True)
 class PreparedCase:
-    """A case with its resolved scene, and those of its variants."""
+    """A case with its resolved scene, and those of its variants.
+
+    Where it has a spectrum, `passes` are the wavelengths, in nm, of the monochromatic pictures that
+    make up each of its pictures, and the media at each.
+    """
 
     loaded: LoadedCase
     scene: ResolvedScene
     variants: tuple[Form, ...] = ()
+    passes: tuple[tuple[float, tuple[Medium, ...]], ...] = ()
+
+    @property
+    def wavelengths(self) -> tuple[float, ...]:
+        """Of its spectrum, in nm; empty where it has none."""
+        return tuple(wavelength for wavelength, _ in self.passes)
 
     @property
     def forms(self) -> tuple[Form, ...]:
@@ -105,7 +116,7 @@ class PreparedCase:
 def prepare(loaded: LoadedCase) -> PreparedCase:
     """Resolves the scene and its variants. Raises InputError where one cannot be."""
     variants = (_form(loaded, variant) for variant in loaded.model.variants)
-    return PreparedCase(loaded, resolve(loaded), tuple(variants))
+    return PreparedCase(loaded, resolve(loaded), tuple(variants), spectral_media(loaded))
 
 
 def _form(loaded: LoadedCase, variant: model.Variant) -> Form:
@@ -147,10 +158,10 @@ def jobs_of(
     scene = scene_for(case.scene, capabilities)
     jobs = []
     if case.wants_images:
-        jobs.append(Job(renderer, IMAGE, scene, settings))
+        jobs += _picture(case, Job(renderer, IMAGE, scene, settings))
         if preflight.noisy:
             other = replace(settings, seed=settings.seed + 1)
-            jobs.append(Job(renderer, SECOND_IMAGE, scene, other))
+            jobs += _picture(case, Job(renderer, SECOND_IMAGE, scene, other))
     for form in case.forms:
         shown = scene_for(form.scene, capabilities)
         for probe in case.loaded.model.probes:
@@ -161,6 +172,20 @@ def jobs_of(
                 Job(renderer, role, made_scene, settings, path) for role, made_scene, path in made
             ]
     return jobs
+
+
+def _picture(case: PreparedCase, job: Job) -> list[Job]:
+    """The jobs that make up a picture: one, or one per wavelength."""
+    if not case.passes:
+        return [job]
+    return [
+        replace(
+            job,
+            role=pass_role(job.role, wavelength),
+            scene=job.scene.model_copy(update={"media": media}),
+        )
+        for wavelength, media in case.passes
+    ]
 
 
 def _probe_scenes(
@@ -209,7 +234,7 @@ def auxiliary_jobs(
         film = case.scene.film
         fine = Film(width=film.width * AREA_FACTOR, height=film.height * AREA_FACTOR)
         jobs.append(Job(helper, AREA_IMAGE, case.scene.model_copy(update={"film": fine}), settings))
-    return jobs
+    return [part for job in jobs for part in _picture(case, job)]
 
 
 def shifted(scene: ResolvedScene, dx: float, dy: float) -> ResolvedScene:
@@ -218,6 +243,11 @@ def shifted(scene: ResolvedScene, dx: float, dy: float) -> ResolvedScene:
     axes = zip(camera.origin, camera.right, camera.up, strict=True)
     origin = tuple(o + dx * r + dy * u for o, r, u in axes)
     return scene.model_copy(update={"camera": camera.model_copy(update={"origin": origin})})
+
+
+def pass_role(role: str, wavelength: float) -> str:
+    """The role of the monochromatic part of a picture."""
+    return f"{role} at {wavelength:.10g} nm"
 
 
 def light_role(probe: model.Probe, form: str = "") -> str:

@@ -7,7 +7,7 @@ remains is the renderer's own resolution, from which every later tolerance is de
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,7 @@ from harness.expected import Float
 from harness.probe.decode import decode, finest_cells
 from harness.probe.scenes import AMPLITUDE, AXES, code_scene
 from harness.renderers.base import Capability, Image, Renderer, RenderSettings
+from harness.scene.resolved import ResolvedScene
 
 # The weakest light a probe path is expected to leave; codes are made as fine as it allows.
 WEAKEST = 0.3
@@ -37,6 +38,9 @@ FINEST = 4095
 COARSEST = 1.01 * 0.5 / 255 * 2.4 / 1.055
 FLOAT32 = float(np.finfo(np.float32).eps)
 FLOAT64 = float(np.finfo(np.float64).eps)
+
+
+Render = Callable[[ResolvedScene, RenderSettings], Image]
 
 
 @dataclass(frozen=True)
@@ -80,21 +84,24 @@ class Preflight:
         }
 
 
-def preflight(renderer: Renderer, settings: RenderSettings) -> Preflight:
-    """Calibrates `renderer`. Raises RendererError where it does not render at all."""
+def preflight(
+    renderer: Renderer, settings: RenderSettings, render: Render | None = None
+) -> Preflight:
+    """Calibrates `renderer`, by `render` where images may come from elsewhere than itself.
+
+    Raises RendererError where it does not render at all.
+    """
+    render = render or renderer.render
     noisy = Capability.PIXEL_CENTRES not in renderer.capabilities
     samples = settings.samples if noisy else None
     epsilon = FLOAT64 if Capability.DOUBLE in renderer.capabilities else FLOAT32
-    images = {axis: renderer.render(ramp_scene(axis), settings) for axis in AXES}
+    images = {axis: render(ramp_scene(axis), settings) for axis in AXES}
     findings = examine(images)
     if findings:
         return Preflight(np.nan, 1, np.nan, epsilon, samples, findings)
     quantum = FLOAT32 if noisy else _quantum(images)
     cells = finest_cells(quantum + 2 * epsilon, WEAKEST, FINEST)
-    codes = {
-        axis: renderer.render(code_scene(chart(), plane(), axis, cells, ""), settings)
-        for axis in AXES
-    }
+    codes = {axis: render(code_scene(chart(), plane(), axis, cells, ""), settings) for axis in AXES}
     wrong = misshapen(codes)
     if wrong:
         return Preflight(quantum, cells, np.nan, epsilon, samples, (wrong,))

@@ -122,7 +122,8 @@ class ImageFile(Model):
 
     `path` is the linear data (EXR); `picture` is the same at full size as a browser can show it,
     `thumbnail` a smaller one. `mean` is of each channel over the picture; `mean_error` is its
-    standard error where the renderer samples.
+    standard error where the renderer samples. `cut` is the mean over the pixels of the weight that
+    the renderer did not follow, where it tells.
     """
 
     role: str
@@ -134,6 +135,7 @@ class ImageFile(Model):
     height: int
     mean: list[float] = Field(default_factory=list)
     mean_error: list[float] = Field(default_factory=list)
+    cut: float | None = None
 
 
 class DifferenceMap(Model):

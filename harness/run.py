@@ -20,6 +20,7 @@ from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdic
 from harness.renderers.base import Renderer, RenderSettings
 from harness.results import Contender
 from harness.session import Progress, Session, Storage
+from harness.shard import write_times
 
 __all__ = ["EXIT_INTERRUPTED", "HELPER", "SAMPLES", "UNFINISHED", "Progress", "exit_code", "run"]
 
@@ -40,6 +41,8 @@ def run(
     quality: str = "normal",
     threads: int = 2,
     seed: int = 0,
+    timeout_s: float = RenderSettings.timeout_s,
+    memory_mb: int = RenderSettings.memory_mb,
     command: str = "",
     stand_ins: StandIns | None = None,
     must_run: Collection[str] = (),
@@ -64,7 +67,7 @@ def run(
     for name in names:
         if names.count(name) > 1:
             raise InputError.of("two renderers of one name", key="--renderer", value=name)
-    settings = RenderSettings(samples=SAMPLES[quality], seed=seed, threads=threads)
+    settings = RenderSettings(SAMPLES[quality], seed, threads, timeout_s, memory_mb)
     with _alone(out):
         passing = Cache(FolderStore(out / UNFINISHED), limit=2**50)
         archive = Archive(out)
@@ -83,6 +86,7 @@ def run(
         finally:
             session.close()
         summary = _summary(session, command, must_run, interrupted)
+        write_times(out, session.records)
         record.write(summary, out / "summary.json")
         if not interrupted:
             shutil.rmtree(out / UNFINISHED, ignore_errors=True)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
-from harness import bundle, plan
+from harness import bundle, plan, spectral
 from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
@@ -97,6 +97,7 @@ class Session:
         self.used: dict[str, set[int]] = {name: set() for name in self.names}
         self.render_s = dict.fromkeys(self.names, 0.0)
         self.effort = Effort()
+        self.records: list[CaseRecord] = []
 
     @property
     def everyone_is_here(self) -> bool:
@@ -238,7 +239,8 @@ class Session:
     def _judge(self, index: int, state: _CaseState) -> None:
         contenders = self._contenders_of(state)
         film = state.case.scene.film
-        results = Results(state.results, film.width, film.height)
+        gathered = spectral.gathered(state.results, state.case.wavelengths)
+        results = Results(gathered, film.width, film.height)
         judgement = CaseJudge(state.case, contenders, results, self.helper).judge()
         written = self.storage.archive.write_case(
             state.case, contenders, results, judgement, state.seconds, self.settings,
@@ -276,6 +278,8 @@ class Session:
         return bool(stood) and all(contender.stored is not None for contender in stood)
 
     def _finish(self, index: int, written: CaseRecord) -> None:
+        # Curves are long, and nobody asks for them here.
+        self.records.append(written.model_copy(update={"curves": [], "checks": []}))
         self.finished[index] = SummaryCase(
             id=written.id, family=written.family, status=written.status, checks=written.checks,
             diagnoses=written.diagnoses,

@@ -121,6 +121,18 @@ def cones() -> st.SearchStrategy[Document]:
 
 
 @cache
+def composed_shapes() -> st.SearchStrategy[Document]:
+    """Unions, and differences that a part of the first shape surely survives."""
+    parts = st.one_of(lenses(), cones(), convex_shapes())
+    hole = st.fixed_dictionaries({"type": st.just("sphere"), "radius": numbers(0.1, 0.2)})
+    unions = st.lists(parts, min_size=2, max_size=3).map(lambda of: {"type": "union", "of": of})
+    drilled = st.tuples(st.one_of(parts, unions), hole).map(
+        lambda of: {"type": "difference", "of": list(of)}
+    )
+    return st.one_of(unions, drilled)
+
+
+@cache
 def solid_shapes() -> st.SearchStrategy[Document]:
     """Shapes of every kind that needs no file, within 6 units of the origin."""
     round_ones = st.one_of(
@@ -146,7 +158,8 @@ def solid_shapes() -> st.SearchStrategy[Document]:
         ),
     )
     polygons = convex_shapes().map(lambda shape: {"type": "polygons", "of": shape})
-    return st.one_of(round_ones, lenses(), cones(), convex_shapes(), polygons)
+    kinds = (round_ones, lenses(), cones(), convex_shapes(), polygons, composed_shapes())
+    return st.one_of(*kinds)
 
 
 @cache

@@ -39,8 +39,9 @@ LAYERS = (
     ("chart",),
     ("verdict", "preflight", "attribution"),
     ("report",),
-    ("baseline", "plan", "results", "probed", "pairs", "explain", "judge", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "run"),
+    ("plan", "results", "probed", "pairs", "explain", "spectral", "judge"),
+    ("baseline", "packing", "archive"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
     ("doctor", "ci"),
     ("show", "cli", "pytest_plugin"),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ from tracer.errors import SceneError
 from tracer.mesh import LEFT, RIGHT, WORDS, Mesh, Tree, grow_tree, require_closed
 from tracer.patterns import Constant, Pattern, Picture, pattern_row
 from tracer.scene import (
-    VACUUM,
     Diffuse,
     DirectionalLight,
     Emissive,
@@ -23,11 +23,13 @@ from tracer.scene import (
     Scene,
     Shape,
     Solid,
+    SolidShape,
     Surface,
     ThinSlab,
     Translucent,
 )
-from tracer.shapes import COLUMNS, Disk, Rectangle, Sphere, bound_row, face_row
+from tracer.shapes import COLUMNS, HOLLOW, Disk, Quadric, Rectangle, Sphere, bound_row, face_row
+from tracer.shared import Bound, Surfaces
 from tracer.solids import Cell, Compound, compound_rows
 
 Floats = NDArray[np.float64]
@@ -38,17 +40,24 @@ DIELECTRIC, EMISSIVE, DIFFUSE, MIRROR, TRANSLUCENT, THIN_SLAB = range(6)
 POINT, DIRECTIONAL = 0.0, 1.0
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
+# MEDIUM and EXTERIOR are what a thin slab is made of and what is around it. In a solid, the k-th of
+# them, the medium is k + 1, so that it also says in which solid a ray is.
 SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS = range(8)
+AMBIENT = 0  # the medium around all solids
 
 
 class Arrays(NamedTuple):
-    """One row of `objects`, `balls` and `materials` per solid, then per surface."""
+    """One row of `objects`, `balls` and `materials` per solid, then per surface.
+
+    Solids are in the order of their rank: where several overlap, the first is there.
+    """
 
     objects: NDArray[np.int64]  # (n, 8)
     balls: Floats  # (n, 4): centre and squared radius of a sphere around it
     materials: Floats  # (n, 9): two colours, thickness, highlight and its exponent
     rows: Floats  # shapes
     media: Floats  # (m, 5): ior, absorption, 1 where it disperses
+    solids: int
     patterns: Floats
     texels: Floats
     lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
@@ -62,29 +71,44 @@ class Arrays(NamedTuple):
 class _Flattener:
     """Collects rows while it walks over a scene."""
 
-    def __init__(self, media: list[Medium]) -> None:
+    def __init__(self) -> None:
         self.objects: list[list[int]] = []
         self.balls: list[list[float]] = []
         self.materials: list[list[float]] = []
         self.rows: list[list[float]] = []
-        self.media = media
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
         self.trees: list[Tree] = []
         self.nodes = self.triangles = self.normals = self.texel_count = 0
+        self.surface_count = 0
+        self.medium_count = 1  # in the order of `media_of`
 
-    def medium(self, medium: Medium) -> int:
-        return self.media.index(medium)
-
-    def solid(self, solid: Solid) -> None:
-        if isinstance(solid.shape, Mesh):
-            require_closed(solid.shape, solid.name)
-        media = self.medium(solid.medium), self.medium(solid.exterior)
-        self._object(solid.shape, DIELECTRIC, media, -1, [0.0] * 7)
+    def solids(self, solids: list[Solid]) -> None:
+        """Solids in the order of their rank."""
+        surfaces = Surfaces()
+        found = [
+            [surfaces.find(bound, _reach(solid.shape)) for bound in _bounds(solid.shape)]
+            for solid in solids
+        ]
+        times = Counter(abs(number) for bounds in found for _, number in bounds)
+        self.surface_count = surfaces.count
+        self.medium_count += len(solids)
+        for k, (solid, bounds) in enumerate(zip(solids, found, strict=True)):
+            shape = solid.shape
+            if isinstance(shape, Mesh):
+                require_closed(shape, solid.name)
+            if isinstance(shape, Sphere) and times[abs(bounds[0][1])] > 1:
+                # As other solids meet that surface, to the last bit.
+                shape = Cell((bounds[0][0],), shape.center, shape.radius)
+            self._object(shape, DIELECTRIC, (1 + k, AMBIENT), -1, [0.0] * 7, bounds)
 
     def surface(self, surface: Surface) -> None:
         kind, media, pattern, row = self._material(surface)
-        self._object(surface.shape, kind, media, pattern, row)
+        bounds = _bounds(surface.shape)
+        numbers = range(self.surface_count + 1, self.surface_count + 1 + len(bounds))
+        self.surface_count += len(bounds)
+        found = list(zip(bounds, numbers, strict=True))
+        self._object(surface.shape, kind, media, pattern, row, found)
 
     def _material(self, surface: Surface) -> tuple[int, tuple[int, int], int, list[float]]:
         material: Material = surface.material
@@ -109,10 +133,11 @@ class _Flattener:
                 passes = [filtered * c + clear for c in color]
                 stays = [(1.0 - filtered - clear) * c for c in color]
                 return TRANSLUCENT, (0, 0), -1, [*passes, *stays, 0.0]
-            case ThinSlab(medium, thickness, exterior):
+            case ThinSlab(thickness=thickness):
                 if not isinstance(surface.shape, Rectangle | Disk):
                     raise SceneError(f"{surface.name}: a thin slab must be a rectangle or a disk")
-                media = self.medium(medium), self.medium(exterior)
+                media = self.medium_count, self.medium_count + 1
+                self.medium_count += 2
                 return THIN_SLAB, media, -1, [*none, *none, thickness]
 
     def pattern(self, pattern: Pattern) -> list[float]:
@@ -129,28 +154,27 @@ class _Flattener:
         media: tuple[int, int],
         pattern: int,
         material_row: list[float],
+        found: list[tuple[Bound, int]],
     ) -> None:
-        first, count, normals = len(self.rows), 1, -1
+        """`found` has the shape's bounds and the numbers of the surfaces that they are."""
+        first, count, normals = len(self.rows), max(1, len(found)), -1
         ball = [0.0, 0.0, 0.0, np.inf]
+        rows = [bound_row(bound, number) for bound, number in found]
         match shape:
             case Sphere(center, radius):
-                kind = SPHERE
-                self.rows.append([*center, radius])
-            case Cell(bounds, center, radius):
-                kind, count = CELL, len(bounds)
-                ball = [*center, radius * radius * (1.0 + 1e-9)]
-                self.rows += [bound_row(bound) for bound in bounds]
+                kind, rows = SPHERE, [[*center, radius]]
+            case Cell(_, center, radius):
+                kind, ball = CELL, [*center, radius * radius * (1.0 + 1e-9)]
             case Compound(where, center, radius):
-                rows = compound_rows(where)
-                kind, count = COMPOUND, len(rows)
-                ball = [*center, radius * radius * (1.0 + 1e-9)]
-                self.rows += rows
+                kind, ball = COMPOUND, [*center, radius * radius * (1.0 + 1e-9)]
+                for row, decisions in zip(rows, compound_rows(where)[1], strict=True):
+                    row += [0.0] * (HOLLOW - len(row)) + decisions
             case Rectangle() | Disk():
-                kind = DISK if isinstance(shape, Disk) else RECTANGLE
-                self.rows.append(face_row(shape))
+                kind, rows = DISK if isinstance(shape, Disk) else RECTANGLE, [face_row(shape)]
             case Mesh():
                 kind, first, count = MESH, self.nodes, self.triangles
                 normals = self._tree(grow_tree(shape))
+        self.rows += rows
         self.objects.append([kind, first, count, material, *media, pattern, normals])
         self.balls.append(ball)
         self.materials.append(material_row)
@@ -167,15 +191,44 @@ class _Flattener:
         return first_normal
 
 
+def ranked(solids: tuple[Solid, ...]) -> list[Solid]:
+    """By falling priority, and of equal ones the smaller before the larger."""
+    return sorted(solids, key=lambda solid: (-solid.priority, _size(solid.shape)))
+
+
+def _bounds(shape: Shape) -> list[Bound]:
+    match shape:
+        case Sphere(center, radius):
+            return [Quadric(center, (0.0, 0.0, 1.0), radius * radius, 0.0, -1.0)]
+        case Cell(bounds):
+            return list(bounds)
+        case Compound(where):
+            return compound_rows(where)[0]
+    return []
+
+
+def _reach(shape: Shape) -> float:
+    """How large coordinates of an analytic shape get."""
+    match shape:
+        case Sphere(center, radius) | Cell(_, center, radius) | Compound(_, center, radius):
+            return max(map(abs, center)) + radius
+    return 0.0
+
+
+def _size(shape: SolidShape) -> float:
+    """The radius of a sphere around it."""
+    if isinstance(shape, Mesh):
+        return float(np.linalg.norm(np.ptp(shape.vertices, axis=0))) / 2.0
+    return shape.radius
+
+
 def media_of(scene: Scene) -> list[Medium]:
-    """All media of a scene, each once; the camera's first."""
-    found = [scene.around_camera, VACUUM]
-    for solid in scene.solids:
-        found += [solid.medium, solid.exterior]
+    """The media of a scene: around everything, in its solids, in and around its thin slabs."""
+    found = [scene.ambient, *(solid.medium for solid in ranked(scene.solids))]
     for surface in scene.surfaces:
         if isinstance(surface.material, ThinSlab):
             found += [surface.material.medium, surface.material.exterior]
-    return list(dict.fromkeys(found))
+    return found
 
 
 def media_table(media: list[Medium], wavelength: float) -> Floats:
@@ -204,7 +257,7 @@ _kept: list[tuple[Scene, Arrays]] = []  # the last scene and its arrays
 
 
 def flatten(scene: Scene) -> Arrays:
-    """Raises SceneError for what cannot be traced. `media[0]` is what the camera stands in.
+    """Raises SceneError for what cannot be traced.
 
     The last scene's arrays are kept, so that following rays through it in turn grows its trees
     once. The numpy arrays of a scene must not be changed afterwards.
@@ -219,9 +272,8 @@ def flatten(scene: Scene) -> Arrays:
 
 def _flatten(scene: Scene) -> Arrays:
     media = media_of(scene)
-    into = _Flattener(media)
-    for solid in scene.solids:
-        into.solid(solid)
+    into = _Flattener()
+    into.solids(ranked(scene.solids))
     for surface in scene.surfaces:
         into.surface(surface)
     around = scene.background
@@ -234,6 +286,7 @@ def _flatten(scene: Scene) -> Arrays:
         materials=_table(into.materials, 9),
         rows=_table(into.rows, COLUMNS),
         media=media_table(media, scene.wavelength),
+        solids=len(scene.solids),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([_light(light) for light in scene.lights], 7),

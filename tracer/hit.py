@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tracer.arrays import (
+    AMBIENT,
     CELL,
     COMPOUND,
     COUNT,
@@ -22,6 +25,7 @@ from tracer.mesh import STACK, mesh_hit, smooth_normal, triangle_normal
 from tracer.shapes import (
     HOLLOW,
     INF,
+    NUMBER,
     bound_normal,
     cell_stretch,
     compound_hit,
@@ -33,6 +37,7 @@ from tracer.shapes import (
 from tracer.vector import Vec, along, dot, scale, sub
 
 NOTHING = -1
+UNKNOWN = -1  # the medium of a ray that begins somewhere
 
 
 def new_stack(scene: Arrays) -> Floats:
@@ -41,61 +46,162 @@ def new_stack(scene: Arrays) -> Floats:
     return np.empty((max(STACK, int(most)), 2))
 
 
+class Hit(NamedTuple):
+    """What a ray meets next: at distance `t`, face `face` of object `object`.
+
+    `object` is NOTHING and `t` infinite if all is missed. `entering` says that the ray comes from
+    outside the solid, or from the front of the face. It came through `medium`; behind an interface
+    is `beyond`, behind anything else the same medium.
+    """
+
+    object: int
+    face: int
+    t: float
+    entering: bool
+    medium: int
+    beyond: int
+
+
 @inlined
 def nearest_hit(
     scene: Arrays,
     o: Vec,
     d: Vec,
+    medium: int,
     left: int,
     left_face: int,
     inward: bool,
     stack: Floats,
-) -> tuple[int, int, float, bool]:
-    """(object, face, distance, entering), object NOTHING and distance infinite if all is missed.
+) -> Hit:
+    """The next hit of a ray through `medium`, which may be UNKNOWN if the ray just begins.
 
     The ray has just left face `left_face` of object `left`, heading to the inside of it if
-    `inward`; or nothing, if `left` is NOTHING. `entering` says that the ray comes from outside
-    the hit solid, or from the front of the hit face.
+    `inward`; or nothing, if `left` is NOTHING. Boundaries of solids where a solid of higher rank
+    is on both sides are passed over.
     """
-    best, hit, hit_face, hit_entering = INF, NOTHING, -1, False
-    for i in range(len(scene.objects)):
-        kind = scene.objects[i, SHAPE]
-        on_face = left_face if i == left else -1
-        if kind == MESH:
-            root, side = scene.objects[i, FIRST], -1 if inward else 1
-            t, face, side = mesh_hit(
-                o, d, scene.nodes, scene.links, scene.triangles, root, on_face, side, best, stack
+    travelled = 0.0
+    while True:
+        hit = _next_hit(scene, o, d, medium, left, left_face, inward, stack)
+        visible = hit.object == NOTHING or hit.object >= scene.solids or hit.beyond != hit.medium
+        if visible:
+            return Hit(
+                hit.object, hit.face, travelled + hit.t, hit.entering, hit.medium, hit.beyond
             )
-            entering = side > 0
-        elif kind == COMPOUND:
-            t, face, entering = _compound_hit(scene, i, o, d, on_face, inward, stack)
-        elif on_face >= 0 and not (inward and kind <= CELL):
-            continue  # nothing of a convex solid lies outwards; a face is not met twice
-        elif kind == SPHERE:
-            t, face, entering = _sphere_hit(scene, i, o, d, on_face)
-        elif kind == CELL:
-            t, face, entering = _cell_hit(scene, i, o, d, on_face)
-        else:
-            t, face, entering = _face_hit(scene, i, o, d, kind == DISK, best)
-        if t < best:
-            best, hit, hit_face, hit_entering = t, i, face, entering
-    return hit, hit_face, best, hit_entering
-
-
-# What a ray meets of one object: (distance, face, entering), infinite distance if it misses.
-# Where on_face >= 0, it has just left that face of the object and heads inwards.
+        o, travelled, medium = along(o, hit.t, d), travelled + hit.t, hit.medium
+        left, left_face, inward = hit.object, hit.face, hit.entering
 
 
 @inlined
-def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
+def _next_hit(
+    scene: Arrays,
+    o: Vec,
+    d: Vec,
+    medium: int,
+    left: int,
+    left_face: int,
+    inward: bool,
+    stack: Floats,
+) -> Hit:
+    """As `nearest_hit`, but all boundaries of solids count.
+
+    A solid that the ray leaves next is one that it is in. So the same walk over all solids, in the
+    order of their rank, also finds the first that it is in before the hit, and behind it.
+    """
+    best, hit, face, entering = INF, NOTHING, -1, False
+    before, beyond = AMBIENT, AMBIENT
+    leaving = _surface_left(scene, left, left_face, inward)
+    for i in range(len(scene.objects)):
+        on_face = left_face if i == left else -1
+        t_max = INF if i < scene.solids else best
+        t, i_face, enters = _object_hit(scene, i, o, d, on_face, inward, leaving, t_max, stack)
+        if t == INF:
+            continue
+        if i < scene.solids:
+            if t < best:
+                beyond = 1 + i if before == AMBIENT and enters else before
+            elif beyond == AMBIENT and enters == (t == best):
+                beyond = 1 + i
+            if before == AMBIENT and not enters:
+                before = 1 + i
+        if t < best:
+            best, hit, face, entering = t, i, i_face, enters
+    if medium == UNKNOWN:
+        medium = before
+    if hit >= scene.solids:
+        beyond = medium
+    return Hit(hit, face, best, entering, medium, beyond)
+
+
+@inlined
+def _surface_left(scene: Arrays, left: int, left_face: int, inward: bool) -> float:
+    """The number of the surface that a ray has left, which solids may share.
+
+    Positive if it points to the inside of that surface; 0 where no other solid has it.
+    """
+    if left == NOTHING:
+        return 0.0
+    kind = scene.objects[left, SHAPE]
+    if kind != CELL and kind != COMPOUND:
+        return 0.0
+    number = float(scene.rows[left_face, NUMBER])
+    return number if inward == (scene.rows[left_face, HOLLOW] == 0.0) else -number
+
+
+@inlined
+def _object_hit(
+    scene: Arrays,
+    i: int,
+    o: Vec,
+    d: Vec,
+    on_face: int,
+    inward: bool,
+    leaving: float,
+    t_max: float,
+    stack: Floats,
+) -> tuple[float, int, bool]:
+    """What the ray meets of object `i`, whose face `on_face` it has just left (-1: none of it).
+
+    Nothing beyond `t_max` is needed.
+    """
+    kind = scene.objects[i, SHAPE]
+    if kind == MESH:
+        return _mesh_hit(scene, i, o, d, on_face, inward, t_max, stack)
+    if kind == COMPOUND:
+        return _compound_hit(scene, i, o, d, leaving, on_face >= 0 and inward, stack)
+    if on_face >= 0 and not (inward and kind <= CELL):
+        return INF, -1, False  # nothing of a convex solid lies outwards; a face is not met twice
+    if kind == SPHERE:
+        return _sphere_hit(scene, i, o, d, on_face >= 0)
+    if kind == CELL:
+        return _cell_hit(scene, i, o, d, leaving, on_face >= 0)
+    return _face_hit(scene, i, o, d, kind == DISK, t_max)
+
+
+# What a ray meets of one object: (distance, face, entering), infinite distance if it misses.
+
+
+@inlined
+def _mesh_hit(
+    scene: Arrays, i: int, o: Vec, d: Vec, on_face: int, inward: bool, t_max: float, stack: Floats
+) -> tuple[float, int, bool]:
+    root, side = scene.objects[i, FIRST], -1 if inward else 1
+    t, face, side = mesh_hit(
+        o, d, scene.nodes, scene.links, scene.triangles, root, on_face, side, t_max, stack
+    )
+    return (t if face >= 0 else INF), face, side > 0
+
+
+@inlined
+def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, inwards: bool) -> tuple[float, int, bool]:
+    """`inwards`: the ray has just left the sphere's surface, heading into it."""
     row = scene.objects[i, FIRST]
     center, radius = vec_at(scene.rows, row, 0), scene.rows[row, 3]
-    if on_face >= 0:
-        return max(0.0, -2.0 * dot(sub(o, center), d)), 0, False
+    if inwards:
+        return max(0.0, -2.0 * dot(sub(o, center), d)), row, False
     enter, leave = sphere_stretch(o, d, center, radius)
     if enter > 0.0:
-        return enter, 0, True
-    return (leave if leave > 0.0 else INF), 0, False
+        return enter, row, True
+    return (leave if leave > 0.0 else INF), row, False
 
 
 @inlined
@@ -107,14 +213,16 @@ def _far_from_ball(scene: Arrays, i: int, o: Vec, d: Vec) -> bool:
 
 
 @inlined
-def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[float, int, bool]:
-    if on_face < 0 and _far_from_ball(scene, i, o, d):
+def _cell_hit(
+    scene: Arrays, i: int, o: Vec, d: Vec, leaving: float, inwards: bool
+) -> tuple[float, int, bool]:
+    """`inwards`: the ray has just left one of the cell's faces, heading into it."""
+    if not inwards and _far_from_ball(scene, i, o, d):
         return INF, -1, False
-    enter, face_in, leave, face_out = cell_stretch(
-        o, d, scene.rows, scene.objects[i, FIRST], scene.objects[i, COUNT], on_face
-    )
-    if on_face >= 0:
-        return leave, face_out, False
+    first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
+    enter, face_in, leave, face_out = cell_stretch(o, d, scene.rows, first, count, leaving)
+    if inwards:  # rounding may put the exit behind the ray
+        return max(leave, 0.0), face_out, False
     if enter >= leave or leave <= 0.0:
         return INF, -1, False
     if enter > 0.0:
@@ -124,12 +232,12 @@ def _cell_hit(scene: Arrays, i: int, o: Vec, d: Vec, on_face: int) -> tuple[floa
 
 @inlined
 def _compound_hit(
-    scene: Arrays, i: int, o: Vec, d: Vec, on_face: int, inward: bool, stack: Floats
+    scene: Arrays, i: int, o: Vec, d: Vec, leaving: float, known_inside: bool, stack: Floats
 ) -> tuple[float, int, bool]:
-    if on_face < 0 and _far_from_ball(scene, i, o, d):
+    if _far_from_ball(scene, i, o, d):
         return INF, -1, False
     first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
-    return compound_hit(o, d, scene.rows, first, count, on_face, inward, stack)
+    return compound_hit(o, d, scene.rows, first, count, leaving, known_inside, stack)
 
 
 @inlined

@@ -7,9 +7,7 @@ import math
 from tracer.arrays import (
     DIELECTRIC,
     DIRECTIONAL,
-    EXTERIOR,
     MATERIAL,
-    MEDIUM,
     THIN_SLAB,
     TRANSLUCENT,
     Arrays,
@@ -55,20 +53,19 @@ def unshadowed(
     """
     passed = (1.0, 1.0, 1.0)
     while True:
-        hit, face, t, entering = nearest_hit(scene, o, to_light, left, left_face, inward, stack)
-        passed = mul(passed, absorbed(scene.media, medium, min(t, distance)))
-        if t >= distance:
+        hit = nearest_hit(scene, o, to_light, medium, left, left_face, inward, stack)
+        passed = mul(passed, absorbed(scene.media, medium, min(hit.t, distance)))
+        if hit.t >= distance:
             return passed
-        material = scene.objects[hit, MATERIAL]
-        if material == DIELECTRIC:
-            medium = scene.objects[hit, MEDIUM] if entering else scene.objects[hit, EXTERIOR]
-        elif material == TRANSLUCENT:
-            passed = mul(passed, vec_at(scene.materials, hit, 0))
-        elif material != THIN_SLAB:
+        material = scene.objects[hit.object, MATERIAL]
+        if material == TRANSLUCENT:
+            passed = mul(passed, vec_at(scene.materials, hit.object, 0))
+        elif material not in (DIELECTRIC, THIN_SLAB):
             return 0.0, 0.0, 0.0
-        o, _, _ = hit_point(scene, o, t, to_light, hit, face, entering)
-        distance -= t
-        left, left_face, inward = hit, face, entering
+        o, _, _ = hit_point(scene, o, hit.t, to_light, hit.object, hit.face, hit.entering)
+        distance -= hit.t
+        medium = hit.beyond
+        left, left_face, inward = hit.object, hit.face, hit.entering
 
 
 @called

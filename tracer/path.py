@@ -22,7 +22,7 @@ from tracer.arrays import (
 )
 from tracer.compiled import compiled, inlined
 from tracer.errors import SceneError
-from tracer.hit import NOTHING, hit_point, nearest_hit, new_stack
+from tracer.hit import NOTHING, UNKNOWN, hit_point, nearest_hit, new_stack
 from tracer.optics import reflect
 from tracer.scene import Scene
 from tracer.surface import interface, thin_slab, upright
@@ -74,6 +74,8 @@ def _take(
     n: Vec,
     geometric: Vec,
     d: Vec,
+    medium: int,
+    beyond: int,
     transmit: bool,
     twice: bool,
 ) -> tuple[int, Vec, Vec, float, float]:
@@ -83,11 +85,9 @@ def _take(
     transmission too, which a thin slab needs. The status is GOING where the lobe exists.
     """
     wi = scale(-1.0, d)
-    outside, inside = scene.objects[hit, EXTERIOR], scene.objects[hit, MEDIUM]
     material = scene.objects[hit, MATERIAL]
     if material == DIELECTRIC:
-        here, beyond = (outside, inside) if entering else (inside, outside)
-        ior_i, ior_t = scene.media[here, 0], scene.media[beyond, 0]
+        ior_i, ior_t = scene.media[medium, 0], scene.media[beyond, 0]
         if scene.objects[hit, NORMALS] >= 0:
             n = upright(wi, n, geometric, ior_i, ior_t)
         transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
@@ -100,6 +100,7 @@ def _take(
             return GOING, p, wr, R, 0.0
         if not transmits:
             return TIR, p, wr, 1.0, 0.0
+        outside, inside = scene.objects[hit, EXTERIOR], scene.objects[hit, MEDIUM]
         optical = scene.media[inside, 0] * length - scene.media[outside, 0] * back
         return GOING if twice else CUT, p_t, d, (1.0 - R) * (1.0 - R), optical
     if material == MIRROR and not transmit:
@@ -120,18 +121,18 @@ def _follow_one(
     stack: Floats,
 ) -> tuple[int, int, Vec, Vec, float, float]:
     """(status, object or NOTHING, last point, last direction, weight, optical length)."""
-    weight, optical, medium = 1.0, 0.0, 0
+    weight, optical, medium = 1.0, 0.0, UNKNOWN
     left, left_face, inward = NOTHING, -1, False
     step, corners = 0, 0
     while True:
         corners = _keep(vertices, corners, o)
-        hit, face, t, entering = nearest_hit(scene, o, d, left, left_face, inward, stack)
+        hit, face, t, entering, medium, beyond = nearest_hit(
+            scene, o, d, medium, left, left_face, inward, stack
+        )
         if hit == NOTHING:
             return MISS, NOTHING, o, d, weight, optical
         p, n, geometric = hit_point(scene, o, t, d, hit, face, entering)
         material = scene.objects[hit, MATERIAL]
-        if material == DIELECTRIC:  # the solid knows through which medium the ray came
-            medium = scene.objects[hit, EXTERIOR if entering else MEDIUM]
         optical += scene.media[medium, 0] * t
 
         if step == len(letters) or step + 1 >= max_depth:
@@ -141,7 +142,7 @@ def _follow_one(
         transmit = letters[step] == TRANSMIT
         twice = step + 1 < len(letters) and letters[step + 1] == TRANSMIT
         status, o, d, factor, more = _take(
-            scene, hit, entering, p, n, geometric, d, transmit, twice
+            scene, hit, entering, p, n, geometric, d, medium, beyond, transmit, twice
         )
         weight *= factor
         optical += more
@@ -153,7 +154,7 @@ def _follow_one(
             corners = _keep(vertices, corners, p)
             step += 1
         if transmit and material == DIELECTRIC:
-            medium = scene.objects[hit, MEDIUM if entering else EXTERIOR]
+            medium = beyond
         left, left_face, inward = hit, face, entering == transmit
 
 
@@ -201,9 +202,9 @@ def follow(
 ) -> Paths:
     """Follows rays along `path`, a letter per interface: T transmit, R reflect.
 
-    `origins` and unit `directions` are (n, 3). Rays start in the medium around the camera. After
-    the last letter a ray must land on a surface. A thin slab is two interfaces, a mirror takes an
-    R and a translucent surface a T. Raises SceneError for a scene or rays that cannot be traced.
+    `origins` and unit `directions` are (n, 3). Rays may start in any medium. After the last letter
+    a ray must land on a surface. A thin slab is two interfaces, a mirror takes an R and a
+    translucent surface a T. Raises SceneError for a scene or rays that cannot be traced.
     """
     o = np.ascontiguousarray(origins, float).reshape(-1, 3)
     d = np.ascontiguousarray(directions, float).reshape(-1, 3)

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.arrays import EXTERIOR, MEDIUM, Arrays, Floats
+from tracer.arrays import MEDIUM, Arrays, Floats
 from tracer.compiled import inlined
-from tracer.hit import NOTHING, nearest_hit
+from tracer.hit import NOTHING, UNKNOWN, nearest_hit
 from tracer.light import absorbed, surroundings
 from tracer.shapes import vec_at
 from tracer.surface import BLACK, Lobes, scatter
@@ -94,24 +94,25 @@ def _worth(ray: Ray, limits: Limits) -> tuple[bool, float]:
 def radiance(
     scene: Arrays, limits: Limits, lobes: Lobes, o: Vec, d: Vec, waiting: Waiting, stack: Floats
 ) -> Seen:
-    """What arrives at `o` against `d`, in medium 0."""
+    """What arrives at `o` against `d`."""
     seen, cut, closest, height = BLACK, 0.0, np.inf, 0
     rays, disperses = 0, False
-    ray = Ray(o, d, (1.0, 1.0, 1.0), 1, 0, NOTHING, -1, False)
+    ray = Ray(o, d, (1.0, 1.0, 1.0), 1, UNKNOWN, NOTHING, -1, False)
     while True:
-        hit, face, t, entering = nearest_hit(
-            scene, ray.o, ray.d, ray.left, ray.left_face, ray.inward, stack
+        hit, face, t, entering, medium, beyond = nearest_hit(
+            scene, ray.o, ray.d, ray.medium, ray.left, ray.left_face, ray.inward, stack
         )
         rays += 1
-        weight = mul(ray.weight, absorbed(scene.media, ray.medium, t))
+        weight = mul(ray.weight, absorbed(scene.media, medium, t))
         if hit == NOTHING:
             seen = add(seen, mul(weight, surroundings(scene, ray.d)))
         else:
-            inside, outside = scene.objects[hit, MEDIUM], scene.objects[hit, EXTERIOR]
-            disperses |= scene.media[inside, 4] + scene.media[outside, 4] > 0.0
+            inside = scene.objects[hit, MEDIUM]  # of a thin slab
+            for known in (medium, beyond, inside):
+                disperses |= scene.media[known, 4] > 0.0
             if ray.segments > 1 and t < closest and max(weight[0], weight[1], weight[2]) >= TELLING:
                 closest = t
-            at = scatter(scene, lobes, ray.o, t, ray.d, ray.medium, hit, face, entering, stack)
+            at = scatter(scene, lobes, ray.o, t, ray.d, medium, hit, face, entering, beyond, stack)
             seen = add(seen, mul(weight, at.sent))
             reflected = Ray(
                 at.p,

@@ -46,11 +46,16 @@ VACUUM = Medium(1.0)
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shape filled with `medium`, lying wholly inside `exterior`."""
+    """A closed shape filled with `medium`.
+
+    Where solids overlap, the one of highest `priority` is there; of equal ones the smallest, so
+    that what lies wholly inside another needs none. Faces that two solids share are one interface
+    between their media.
+    """
 
     shape: SolidShape
     medium: Medium
-    exterior: Medium = VACUUM
+    priority: int = 0
     name: str = "solid"
 
 
@@ -201,6 +206,6 @@ class Scene:
     surfaces: tuple[Surface, ...] = ()
     lights: tuple[PointLight | DirectionalLight, ...] = ()
     background: Vec | Picture = (0.0, 0.0, 0.0)
-    around_camera: Medium = VACUUM
+    ambient: Medium = VACUUM  # around all solids
     wavelength: float = LINE_D
     transport: Transport = field(default_factory=Transport)

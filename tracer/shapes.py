@@ -26,10 +26,11 @@ from tracer.vector import Vec, along, dot, normalise, scale, sub
 Rows = NDArray[np.float64]
 INF = math.inf
 PLANE, QUADRIC = 0.0, 1.0
+NUMBER = 1  # column of the number of the surface that a bound is
 COLUMNS = 14  # of the table that all shapes are written to
 # Of a compound's bounds: whether the solid is outside of it, and which of the compound's bounds
 # decides next, for a point inside of it and for one outside; or that all is decided.
-HOLLOW, IF_INSIDE, IF_OUTSIDE = 10, 11, 12
+HOLLOW, IF_INSIDE, IF_OUTSIDE = 11, 12, 13
 INSIDE, OUTSIDE = -1, -2
 
 
@@ -105,10 +106,11 @@ class Disk:
 # --- rows of numbers ------------------------------------------------------------------------------
 
 
-def bound_row(bound: Plane | Quadric) -> list[float]:
+def bound_row(bound: Plane | Quadric, number: int) -> list[float]:
+    """`number` is that of the surface that the bound is, negative on its other side."""
     if isinstance(bound, Plane):
-        return [PLANE, *bound.normal, bound.offset]
-    return [QUADRIC, *bound.origin, *bound.axis, bound.a, bound.b, bound.c]
+        return [PLANE, number, *bound.normal, bound.offset]
+    return [QUADRIC, number, *bound.origin, *bound.axis, bound.a, bound.b, bound.c]
 
 
 def face_row(face: Rectangle | Disk) -> list[float]:
@@ -160,9 +162,9 @@ def plane_stretch(o: Vec, d: Vec, normal: Vec, offset: float) -> tuple[float, fl
 @called
 def quadric_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[float, float]:
     """`on_it` says that `o` lies on the surface and `d` points inwards: one root is t = 0."""
-    axis = vec_at(rows, row, 4)
-    a, b, c = rows[row, 7], rows[row, 8], rows[row, 9]
-    start = sub(o, vec_at(rows, row, 1))
+    axis = vec_at(rows, row, 5)
+    a, b, c = rows[row, 8], rows[row, 9], rows[row, 10]
+    start = sub(o, vec_at(rows, row, 2))
     dz = dot(d, axis)
     shift = 0.0 if on_it else -dot(start, d)
     p = along(start, shift, d)
@@ -203,47 +205,59 @@ def bound_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[fl
         return quadric_stretch(o, d, rows, row, on_it)
     if on_it:
         return 0.0, INF  # entered through it; a plane is not crossed twice
-    return plane_stretch(o, d, vec_at(rows, row, 1), rows[row, 4])
+    return plane_stretch(o, d, vec_at(rows, row, 2), rows[row, 5])
 
 
 @inlined
 def cell_stretch(
-    o: Vec, d: Vec, rows: Rows, first: int, count: int, left: int
+    o: Vec, d: Vec, rows: Rows, first: int, count: int, leaving: float
 ) -> tuple[float, int, float, int]:
     """(enter, row entered through, leave, row left through) of what is inside `count` bounds.
 
-    If the ray starts on the bound in row `left` and points inwards, enter is 0.
+    The ray starts on the surface of number `leaving` (0: on none), and points to the inside of the
+    bounds that are this surface; to the outside if it is negative.
     """
     enter, row_in, leave, row_out = -INF, -1, INF, -1
     for row in range(first, first + count):
-        t0, t1 = bound_stretch(o, d, rows, row, row == left)
+        number = rows[row, NUMBER]
+        if leaving != 0.0 and number == -leaving:
+            return INF, -1, -INF, -1  # a convex bound is not met again
+        t0, t1 = bound_stretch(o, d, rows, row, number == leaving)
         if t0 > enter:
             enter, row_in = t0, row
         if t1 < leave:
             leave, row_out = t1, row
-    if left >= 0:
-        return 0.0, left, max(leave, 0.0), row_out
     return enter, row_in, leave, row_out
 
 
 @called
 def compound_hit(
-    o: Vec, d: Vec, rows: Rows, first: int, count: int, left: int, inward: bool, stretches: Rows
+    o: Vec,
+    d: Vec,
+    rows: Rows,
+    first: int,
+    count: int,
+    leaving: float,
+    known_inside: bool,
+    stretches: Rows,
 ) -> tuple[float, int, bool]:
     """(distance, row, entering) where a ray next enters or leaves a compound of `count` bounds.
 
-    The ray has just left the bound in row `left` (-1: has not) and heads into the solid if
-    `inward`. `stretches` is scratch. Infinite distance where the solid is not met again.
+    `leaving` as in `cell_stretch`; `known_inside` says that the ray starts in the solid,
+    whatever rounding makes of it. `stretches` is scratch. Infinite distance where the solid is not
+    met again.
     """
     for k in range(count):
         row = first + k
-        if row == left and inward == (rows[row, HOLLOW] != 0.0):
-            stretches[k, 0], stretches[k, 1] = -INF, 0.0  # a convex bound is not met again
+        number = rows[row, NUMBER]
+        if leaving != 0.0 and number == -leaving:
+            stretches[k, 0], stretches[k, 1] = -INF, 0.0
         else:
-            stretches[k, 0], stretches[k, 1] = bound_stretch(o, d, rows, row, row == left)
+            t0, t1 = bound_stretch(o, d, rows, row, number == leaving)
+            stretches[k, 0], stretches[k, 1] = t0, t1
     t = 0.0
     inside = _inside_after(rows, first, stretches, t)
-    if left >= 0 and inward and not inside:  # rounding put the exit behind the ray
+    if known_inside and not inside:
         return 0.0, _left_behind(rows, first, count, stretches), False
     while True:
         crossing = INF
@@ -336,11 +350,11 @@ def sphere_normal(p: Vec, center: Vec, radius: float) -> Vec:
 @inlined
 def bound_normal(p: Vec, rows: Rows, row: int) -> Vec:
     if rows[row, 0] == PLANE:
-        return vec_at(rows, row, 1)
-    axis = vec_at(rows, row, 4)
-    from_origin = sub(p, vec_at(rows, row, 1))
+        return vec_at(rows, row, 2)
+    axis = vec_at(rows, row, 5)
+    from_origin = sub(p, vec_at(rows, row, 2))
     z = dot(from_origin, axis)
-    gradient = sub(from_origin, scale((1.0 + rows[row, 9]) * z + 0.5 * rows[row, 8], axis))
+    gradient = sub(from_origin, scale((1.0 + rows[row, 10]) * z + 0.5 * rows[row, 9], axis))
     if dot(gradient, gradient) == 0.0:  # the tip of a cone
         return -axis[0], -axis[1], -axis[2]
     return normalise(gradient)

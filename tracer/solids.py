@@ -15,16 +15,12 @@ import numpy as np
 
 from tracer.errors import SceneError
 from tracer.shapes import (
-    COLUMNS,
-    HOLLOW,
-    IF_INSIDE,
     INF,
     INSIDE,
     OUTSIDE,
     Plane,
     Quadric,
     Sphere,
-    bound_row,
     require_positive,
 )
 from tracer.vector import Vec
@@ -71,13 +67,13 @@ class Compound:
     radius: float
 
 
-Solid = Sphere | Cell | Compound
+Analytic = Sphere | Cell | Compound
 
 
 # --- set operations -------------------------------------------------------------------------------
 
 
-def _where(solid: Solid) -> Where:
+def _where(solid: Analytic) -> Where:
     match solid:
         case Sphere(center, radius):
             return Side(Quadric(center, (0.0, 0.0, 1.0), radius * radius, 0.0, -1.0))
@@ -98,25 +94,25 @@ def _outside(where: Where) -> Where:
             return AllOf(tuple(map(_outside, parts)))
 
 
-def union(*solids: Solid) -> Compound:
+def union(*solids: Analytic) -> Compound:
     """What is inside any of the solids. Faces that they share are no faces of it."""
     center, radius = _ball_around(solids)
     return Compound(AnyOf(tuple(map(_where, solids))), center, radius)
 
 
-def intersection(*solids: Solid) -> Compound:
+def intersection(*solids: Analytic) -> Compound:
     """What is inside all of the solids."""
     smallest = min(solids, key=lambda solid: solid.radius)
     return Compound(AllOf(tuple(map(_where, solids))), smallest.center, smallest.radius)
 
 
-def difference(solid: Solid, *without: Solid) -> Compound:
+def difference(solid: Analytic, *without: Analytic) -> Compound:
     """What is inside of one solid, and outside of all others."""
     parts = (_where(solid), *(_outside(_where(other)) for other in without))
     return Compound(AllOf(parts), solid.center, solid.radius)
 
 
-def _ball_around(solids: Sequence[Solid]) -> tuple[Vec, float]:
+def _ball_around(solids: Sequence[Analytic]) -> tuple[Vec, float]:
     centers = np.array([solid.center for solid in solids])
     radii = np.array([solid.radius for solid in solids])
     low, high = (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
@@ -125,19 +121,20 @@ def _ball_around(solids: Sequence[Solid]) -> tuple[Vec, float]:
     return (x, y, z), float(reach.max())
 
 
-def compound_rows(where: Where) -> list[list[float]]:
-    """A row for each bound, with what to look at next: short-circuit evaluation, written out."""
+def compound_rows(where: Where) -> tuple[list[Bound], list[list[float]]]:
+    """(bounds, what to look at next after each): short-circuit evaluation, written out.
+
+    The numbers belong into the columns from HOLLOW on.
+    """
+    bounds: list[Bound] = []
     rows: list[list[float]] = []
 
     def write(part: Where, if_true: int, if_false: int) -> None:
         match part:
             case Side(bound, hollow):
-                row = bound_row(bound)
-                row += [0.0] * (COLUMNS - len(row))
-                row[HOLLOW] = float(hollow)
                 decided = (if_false, if_true) if hollow else (if_true, if_false)
-                row[IF_INSIDE : IF_INSIDE + 2] = map(float, decided)
-                rows.append(row)
+                bounds.append(bound)
+                rows.append([float(hollow), *map(float, decided)])
             case AllOf(parts) | AnyOf(parts):
                 *others, last = parts
                 for one in others:
@@ -149,7 +146,7 @@ def compound_rows(where: Where) -> list[list[float]]:
                 write(last, if_true, if_false)
 
     write(where, INSIDE, OUTSIDE)
-    return rows
+    return bounds, rows
 
 
 def _count(where: Where) -> int:

@@ -133,9 +133,13 @@ def scatter(
     hit: int,
     face: int,
     entering: bool,
+    behind: int,
     stack: Floats,
 ) -> Scattered:
-    """What happens to the ray from `o` along `d` in `medium`, which hits after `t`."""
+    """What happens to the ray from `o` along `d` in `medium`, which hits after `t`.
+
+    Behind an interface is the medium `behind`.
+    """
     objects = scene.objects
     p, n, geometric = hit_point(scene, o, t, d, hit, face, entering)
     wi = scale(-1.0, d)
@@ -143,8 +147,7 @@ def scatter(
     wr, wt, p_t, beyond, crossed = wi, d, p, medium, 1
     material = objects[hit, MATERIAL]
     if material == DIELECTRIC:
-        inside, outside = objects[hit, MEDIUM], objects[hit, EXTERIOR]
-        medium, beyond = (outside, inside) if entering else (inside, outside)
+        beyond = behind
         ior_i, ior_t = scene.media[medium, 0], scene.media[beyond, 0]
         if objects[hit, NORMALS] >= 0:
             n = upright(wi, n, geometric, ior_i, ior_t)

@@ -35,6 +35,7 @@ class Capability(enum.StrEnum):
     CONE = "cone"
     LENS = "lens"  # with spherical or plane faces
     CONIC = "conic"  # lenses of other conics, too
+    CSG = "csg"  # unions, intersections and differences of what else it has
     MESH = "mesh"
     SMOOTH_MESH = "smooth-mesh"
     THIN_SLAB = "thin-slab"  # the lecture's thin face; others are given a real slab
@@ -102,7 +103,9 @@ class Image:
 
     `variance` (H, W, 3) is the estimated variance of each pixel's mean where the renderer
     samples, else None. `closest` (H, W) is the shortest way between two surfaces, in scene units,
-    on any ray of the pixel whose loss would show; None where the renderer does not tell.
+    on any ray of the pixel whose loss would show; None where the renderer does not tell. `cut` is
+    the mean over the pixels of the weight that was not followed, for min_weight or max_depth; None
+    where the renderer does not tell.
     """
 
     pixels: NDArray[np.float32]
@@ -111,6 +114,7 @@ class Image:
     log: str = ""
     command: str = ""  # what was run, for people to run again
     closest: NDArray[np.float32] | None = None
+    cut: float | None = None
 
 
 @dataclass(frozen=True)

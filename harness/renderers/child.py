@@ -18,11 +18,11 @@ from typing import IO, Any
 from pydantic import ValidationError
 
 from harness.errors import RendererError, RendererFailed, RendererMissing, RendererUnsupported
-from harness.renderers.process import POLL_S, describe_signal, tail
+from harness.renderers.limits import OUTPUT_MB, POLL_S, Watch
+from harness.renderers.process import describe_signal, tail
 from harness.renderers.process_tree import ProcessTree, spawn
 from harness.renderers.wire import Reply
 
-OUTPUT_MB = 512  # no file that a child writes, its log among them, grows beyond
 LINE_BYTES = 1 << 20  # no reply is longer
 _ERRORS: dict[str, type[RendererError]] = {
     "failed": RendererFailed,
@@ -66,19 +66,27 @@ class Child:
         """Whether it still runs, as far as one can see."""
         return self._end.alive and self._tree.process.poll() is None
 
-    def ask(self, request: Mapping[str, Any], timeout_s: float, memory_mb: int) -> Reply:
+    def ask(
+        self,
+        request: Mapping[str, Any],
+        timeout_s: float,
+        memory_mb: int,
+        private: Path | None = None,
+    ) -> Reply:
         """The reply to `request`, to which an id is added.
 
         A child that dies, does not answer within `timeout_s`, holds more than `memory_mb` of
-        resident memory or answers something else is ended: RendererFailed, with the tail of what
-        it wrote to stderr. An answer that says no is raised as the error that it names.
+        resident memory, fills the folder `private` or answers something else is ended:
+        RendererFailed, with the tail of what it wrote to stderr. An answer that says no is raised
+        as the error that it names.
         """
         self._requests += 1
         self._log.truncate(0)  # what follows in the log belongs to this request
         started = time.monotonic()
         try:
             self._send({"id": self._requests, **request})
-            reply = self._reply(self._receive(started + timeout_s, timeout_s, memory_mb))
+            watch = Watch(self._tree, memory_mb, private=private)
+            reply = self._reply(self._receive(started + timeout_s, timeout_s, watch))
         except _Broken as broken:
             message = f"{self._name} {broken}"
             self._tree.kill()
@@ -126,11 +134,10 @@ class Child:
         except OSError:
             raise _Broken(self._death()) from None
 
-    def _receive(self, deadline: float, timeout_s: float, memory_mb: int) -> bytes:
+    def _receive(self, deadline: float, timeout_s: float, watch: Watch) -> bytes:
         """One line, however long it takes within the limits. Raises _Broken."""
         pipe = self._tree.process.stdout
         assert pipe is not None
-        look_at_memory = time.monotonic() + POLL_S
         while b"\n" not in self._buffer:
             if select.select([pipe], [], [], POLL_S)[0]:
                 chunk = os.read(pipe.fileno(), 1 << 16)
@@ -139,13 +146,10 @@ class Child:
                 self._buffer += chunk
             if len(self._buffer) > LINE_BYTES:
                 raise _Broken("floods its stdout")
-            now = time.monotonic()
-            if now > deadline:
+            if time.monotonic() > deadline:
                 raise _Broken(f"did not answer within {timeout_s:g} s")
-            if now > look_at_memory:
-                if self._tree.resident_mb() > memory_mb:
-                    raise _Broken(f"used more than {memory_mb} MB of memory")
-                look_at_memory = now + POLL_S
+            if passed := watch.passed():
+                raise _Broken(passed)
         line, _, self._buffer = self._buffer.partition(b"\n")
         return line
 

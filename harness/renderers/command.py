@@ -169,6 +169,7 @@ class CommandRenderer:
                 cwd=self._folder,
                 timeout_s=settings.timeout_s,
                 memory_mb=settings.memory_mb,
+                private=Path(private),
                 env={**os.environ, "TMPDIR": private},
             )
             log = tail(done.stderr.strip() or done.stdout)

@@ -15,6 +15,7 @@ _SHAPES = {
     resolved.Cylinder: Capability.CYLINDER,
     resolved.Cone: Capability.CONE,
     resolved.Lens: Capability.LENS,
+    resolved.Csg: Capability.CSG,
     resolved.Mesh: Capability.MESH,
 }
 _MATERIALS = {
@@ -78,6 +79,9 @@ def _of_shape(shape: resolved.SurfaceShape, place: str) -> Iterator[tuple[Capabi
         yield capability, f"{place} is a {shape.type}"
     if isinstance(shape, resolved.Lens) and any(shape.conics):
         yield Capability.CONIC, f"{place} has faces that are no spheres"
+    if isinstance(shape, resolved.Csg):
+        for part in shape.parts:
+            yield from _of_shape(part, place)
     if isinstance(shape, resolved.Mesh) and shape.normals is not None:
         yield Capability.SMOOTH_MESH, f"{place} is shaded smoothly"
 

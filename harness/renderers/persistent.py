@@ -119,7 +119,7 @@ class WorkerRenderer:
             if reply.closest is not None:
                 closest = delivered(reply.closest, scene.film, log=reply.log)[0][..., 0]
             seconds = reply.seconds or 0.0
-            return Image(pixels, variance, seconds, log, reply.command, closest)
+            return Image(pixels, variance, seconds, log, reply.command, closest, reply.cut)
 
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
@@ -207,7 +207,10 @@ class WorkerRenderer:
         request: dict[str, Any] = {"op": operation, "settings": dataclasses.asdict(settings)}
         request |= {key: str(value) for key, value in more.items()}
         with self._lock:
-            return self._started().ask(request, settings.timeout_s, settings.memory_mb)
+            child = self._started()
+            output = more.get("output")
+            private = output.parent if isinstance(output, Path) else None
+            return child.ask(request, settings.timeout_s, settings.memory_mb, private)
 
     def _started(self) -> Child:
         """The living worker, after it has said hello."""

@@ -72,6 +72,7 @@ class PovRayRenderer:
             Capability.CONE,
             Capability.LENS,
             Capability.CONIC,
+            Capability.CSG,
             Capability.MESH,
             Capability.SMOOTH_MESH,
             Capability.MIRROR,
@@ -178,7 +179,9 @@ def _run(argv: list[str], folder: Path, settings: RenderSettings) -> Finished:
     env = {**os.environ, "HOME": str(home), "POVINI": str(ini)}
     timeout_s, memory_mb = settings.timeout_s, settings.memory_mb
     try:
-        return run_limited(argv, cwd=folder, timeout_s=timeout_s, memory_mb=memory_mb, env=env)
+        return run_limited(
+            argv, cwd=folder, timeout_s=timeout_s, memory_mb=memory_mb, private=folder, env=env
+        )
     except RendererFailed as error:
         raise RendererFailed(str(error), log=messages(error.log)) from None
 

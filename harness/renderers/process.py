@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import RendererFailed
+from harness.renderers.limits import LOG_MB, OUTPUT_MB, POLL_S, Watch
 from harness.renderers.process_tree import ProcessTree, spawn
 
-POLL_S = 0.05  # how often time and memory are looked at
 LOG_CHARACTERS = 4000  # how much of a log an error carries
 
 
@@ -39,7 +39,8 @@ def run_limited(
     cwd: Path,
     timeout_s: float,
     memory_mb: int,
-    output_mb: int = 512,
+    output_mb: int = OUTPUT_MB,
+    private: Path | None = None,
     stdin: bytes | None = None,
     env: Mapping[str, str] | None = None,
 ) -> Finished:
@@ -50,7 +51,9 @@ def run_limited(
       rather than reserved memory (RLIMIT_AS), because compilers and garbage collectors reserve
       many times what they use. It is looked at every 50 ms, so a program that fills memory at
       full speed can overshoot by what it touches in that time.
-    * `output_mb` for each file that it writes (Linux), and for its stdout and stderr together.
+    * `output_mb` for each file that it writes (Linux) and for all files in `private` together,
+      and 64 MB for its stdout and stderr.
+    * 256 processes.
 
     `env` replaces the environment. Raises RendererMissing where the program cannot be found,
     RendererFailed, with the tail of its log, where a limit or a signal ended it.
@@ -68,9 +71,10 @@ def run_limited(
         output_mb=output_mb,
         cpu_s=cpu_s,
     )
-    streams = _Streams(tree.process, stdin or b"", output_mb * 2**20)
+    streams = _Streams(tree.process, stdin or b"", min(output_mb, LOG_MB) * 2**20)
+    watch = Watch(tree, memory_mb, output_mb, private)
     try:
-        usage = _wait(tree, streams, started + timeout_s, timeout_s, memory_mb)
+        usage = _wait(tree, streams, started + timeout_s, timeout_s, watch)
     except _Limit as limit:
         raise RendererFailed(str(limit), log=streams.log()) from None
     finally:
@@ -111,10 +115,9 @@ class _Limit(Exception):
 
 
 def _wait(
-    tree: ProcessTree, streams: _Streams, deadline: float, timeout_s: float, memory_mb: int
+    tree: ProcessTree, streams: _Streams, deadline: float, timeout_s: float, watch: Watch
 ) -> float:
     """Waits for the end; returns processor seconds. Raises _Limit."""
-    look_at_memory = time.monotonic() + POLL_S
     while True:
         streams.pump(POLL_S)
         usage = _reap(tree.process, os.WNOHANG)
@@ -123,13 +126,10 @@ def _wait(
             return usage
         if streams.overflowed:
             raise _Limit("wrote too much to stdout and stderr")
-        now = time.monotonic()
-        if now > deadline:
+        if time.monotonic() > deadline:
             raise _Limit(f"not done after {timeout_s:g} s")
-        if now > look_at_memory:
-            if tree.resident_mb() > memory_mb:
-                raise _Limit(f"used more than {memory_mb} MB of memory")
-            look_at_memory = now + POLL_S
+        if passed := watch.passed():
+            raise _Limit(passed)
 
 
 def _reap(process: subprocess.Popen[bytes], options: int) -> float | None:

@@ -86,6 +86,10 @@ class ProcessTree:
                 total += member.memory_info().rss
         return total / 2**20
 
+    def count(self) -> int:
+        """How many processes there are, as of the last look at their memory."""
+        return sum(_runs(member) for member in list(self._members.values()))
+
     def kill(self) -> None:
         """Ends every member at once. Harmless where all of them are gone."""
         while True:

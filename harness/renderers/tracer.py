@@ -40,12 +40,11 @@ class TracerEngine:
             image = tracer.render(translate(scene), film.width, film.height, settings.threads)
         except tracer.SceneError as error:
             raise RendererFailed(f"the tracer refuses the scene: {error}") from error
-        cut = float(image.cut.mean())
         return Image(
             pixels=image.pixels.astype(np.float32),
             closest=np.minimum(image.closest, FAR).astype(np.float32),
             seconds=time.perf_counter() - start,
-            log=f"mean weight cut by max_depth and min_weight: {cut:.3g}",
+            cut=float(image.cut.mean()),
         )
 
     def trace(

@@ -38,6 +38,7 @@ class Reply(BaseModel):
     command: str = ""
     variance: Path | None = None
     closest: Path | None = None
+    cut: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
     vertices: Path | None = None
     file: Path | None = None
     # health

@@ -102,6 +102,8 @@ class Server:
         reply: Message = {"log": image.log, "command": image.command}
         if image.seconds:
             reply["seconds"] = image.seconds
+        if image.cut is not None:
+            reply["cut"] = image.cut
         if image.variance is not None:
             variance = output.with_name(f"{output.stem}.variance.npy")
             imagefile.write_npy(variance, image.variance)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from harness import record as records
 from harness.errors import InputError
 from harness.record import CaseRecord, Summary, SummaryCase, Verdict
-from harness.report import chart, mathml, overview, quantity, view
+from harness.report import changes, chart, mathml, overview, quantity, view
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
 from harness.report.links import RunFolder, clean, page_name, url
 from harness.report.pagedata import case_data
@@ -138,6 +138,8 @@ class _Report:
             headings=_parameters(record),
             formula=mathml.typeset(record.formula),
             checks=checks,
+            change_of=changes.change,
+            diagnoses=overview.ranked(record.diagnoses, record.checks),
             worst_of={v.check.renderer: v for v in reversed(checks)},
             runs=runs,
             pictured=any(images for _, _, images in runs),
@@ -179,11 +181,23 @@ class _Report:
             exit_meaning=overview.EXIT_CODES.get(self.summary.exit_code, "unknown"),
             stray=self.stray,
             verdicts=[verdict.value for verdict in Verdict],
+            diagnoses=overview.ranked(
+                self.summary.diagnoses, (c for case in self.summary.cases for c in case.checks)
+            ),
+            changed=changes.panel(self.summary.baseline),
+            changes=_change_chips(rows),
             failures=overview.failures(self.summary),
             pages={row.id: row.page for row in rows},
             trends=self.trends.panels(self.summary),
             worst_page=_page_of(rows, verdict.worst_case),
         )
+
+
+def _change_chips(rows: list[view.Row]) -> list[tuple[str, str, str]]:
+    """(state, tone, word) of each state that cases are in, where there is more than one."""
+    states = {row.change.state: row.change for row in rows if row.change}
+    known = [states[state.value] for state in changes.ORDER if state.value in states]
+    return [(c.state, c.tone, c.text) for c in known] if len(known) > 1 else []
 
 
 def _page_of(rows: list[view.Row], case_id: str) -> str | None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from harness.record import Summary, Verdict
+from harness.record import Check, Diagnosis, Summary, Verdict
 from harness.report.links import clean
 from harness.report.quantity import count, number
 from harness.report.view import CheckView, Row, check_view
@@ -93,6 +93,13 @@ def failures(summary: Summary) -> tuple[list[Failure], int]:
     )
     shown = [Failure(clean(case), view, more) for (_, case, view), more in worst[:MOST_FAILURES]]
     return shown, max(0, len(worst) - MOST_FAILURES)
+
+
+def ranked(diagnoses: Sequence[Diagnosis], checks: Iterable[Check]) -> list[tuple[str, Diagnosis]]:
+    """Diagnoses with the verdict whose colour they bear: of renderers that fail before the rest."""
+    failing = {c.renderer for c in checks if c.status in (Verdict.FAIL, Verdict.ERROR)}
+    toned = [("fail" if d.renderer in failing else "known", d) for d in diagnoses]
+    return sorted(toned, key=lambda item: item[0] != "fail")
 
 
 def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:

@@ -26,6 +26,7 @@ from harness.record import (
     Verdict,
     worst,
 )
+from harness.report.changes import Change, change
 from harness.report.chart import sparkline
 from harness.report.links import RunFolder, clean
 from harness.report.quantity import number, share, with_unit
@@ -198,6 +199,8 @@ class Cell:
     bad: int
     reason: str
     picture: Picture | None
+    change: Change | None
+    stored: bool  # an approved result stands in for the renderer
 
 
 @dataclass(frozen=True)
@@ -224,6 +227,8 @@ class Row:
     cells: list[Cell]
     worst: Worst | None
     sort: str
+    change: Change | None
+    diagnoses: list[tuple[str, str]]  # (renderer, sentence)
 
 
 def split_id(case_id: str) -> tuple[str, list[tuple[str, str]]]:
@@ -261,6 +266,8 @@ def row(
         cells=cells,
         worst=_worst(record, curve, cells, colours, folder) if record else None,
         sort=_sort_keys(case, cells),
+        change=change(case.checks),
+        diagnoses=[(d.renderer, clean(d.sentence)) for d in case.diagnoses],
     )
 
 
@@ -328,6 +335,8 @@ def _cell(
         bad=sum(view.check.status in (Verdict.FAIL, Verdict.ERROR) for view in views),
         reason=reason,
         picture=shown,
+        change=change(view.check for view in views),
+        stored=run is not None and run.stored is not None,
     )
 
 

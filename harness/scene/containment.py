@@ -15,6 +15,7 @@ from harness.scene.tessellation import distance, winding
 
 Points = NDArray[np.float64]  # (n, 3)
 
+ON_SURFACE = 1e-12  # of the coordinates: some roundings
 MOST_WORK = 2_000_000  # points x triangles that one comparison of solids may take
 
 
@@ -45,7 +46,7 @@ def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.fl
             along = local @ axis
             across = np.linalg.norm(local - along[:, None] * axis, axis=1)
             return np.asarray(np.maximum(across - shape.radius, np.abs(along) - shape.height / 2))
-        case resolved.Cone() | resolved.Lens():
+        case resolved.Cone() | resolved.Lens() | resolved.Csg():
             return depth(region(shape), points)
         case resolved.Mesh():
             vertices, triangles = np.array(shape.vertices), np.array(shape.triangles)
@@ -74,6 +75,15 @@ def bounds(shape: resolved.SurfaceShape) -> tuple[Points, Points]:
             return _around_rings(
                 shape.frame, [(0.0, shape.radius), (shape.height, shape.top_radius)]
             )
+        case resolved.Csg():
+            lows, highs = zip(*map(bounds, shape.parts), strict=True)
+            match shape.operation:
+                case "union":
+                    return np.min(lows, axis=0), np.max(highs, axis=0)
+                case "intersection":
+                    return np.max(lows, axis=0), np.min(highs, axis=0)
+                case "difference":
+                    return lows[0], highs[0]
         case resolved.Lens():
             return _around_rings(shape.frame, [(z, shape.aperture) for z in ends(shape)])
     origin = np.array(shape.frame.origin)
@@ -202,10 +212,20 @@ def _samples(shape: resolved.SolidShape, towards: Points) -> Points:
             return _ring_samples(shape.frame, [*levels, (0.0, 0.0), (shape.height, 0.0)])
         case resolved.Lens():
             return _ring_samples(shape.frame, _lens_rings(shape))
+        case resolved.Csg():
+            return surface_samples(shape, towards)
         case resolved.Mesh():
             vertices = np.array(shape.vertices)
             middles = vertices[np.array(shape.triangles)].mean(axis=1)
             return np.concatenate([vertices, middles])
+
+
+def surface_samples(shape: resolved.Csg, towards: Points) -> Points:
+    """Points of its parts' surfaces that are on its own; none where nothing is left of it."""
+    points = np.concatenate([_samples(part, towards) for part in shape.parts])
+    within = ON_SURFACE * np.abs(points).max()
+    where = region(shape)
+    return np.asarray(points[np.abs(depth(where, points)) <= within])
 
 
 def _sphere_directions() -> Points:

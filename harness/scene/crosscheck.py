@@ -21,6 +21,7 @@ from harness.measure.observables import (
 from harness.scene.expressions import is_expression
 from harness.scene.findings import Finding, KeyPath, quoted
 
+WAYS = ("ior", "glass", "sellmeier", "cauchy", "abbe")  # in which a medium says its index
 AIR = "air"  # what surrounds everything; a scene may define it otherwise
 AGAINST = frozenset({"truth", "renderers"})
 OBSERVABLES = frozenset(o.value for o in Observable if o not in IMPLIED_OBSERVABLES)
@@ -89,7 +90,11 @@ def _repeated_names(document: Table) -> Iterator[Finding]:
 
 
 def _media(document: Table) -> Iterator[Finding]:
-    known = {AIR, *_table(document, "media")}
+    media = _table(document, "media")
+    for name, medium in media.items():
+        if isinstance(medium, dict):
+            yield from _index(("media", name), medium)
+    known = {AIR, *media}
     for index, solid in _rows(document, "solids"):
         yield from _reference(("solids", index, "medium"), _text(solid, "medium"), known)
     for index, surface in _rows(document, "surfaces"):
@@ -98,6 +103,19 @@ def _media(document: Table) -> Iterator[Finding]:
         yield from _reference(path, _text(material, "medium"), known)
     camera = _table(document, "camera")
     yield from _reference(("camera", "medium"), _text(camera, "medium"), known)
+
+
+def _index(path: KeyPath, medium: Table) -> Iterator[Finding]:
+    """Whether a medium says its index, and in one way only."""
+    said = [way for way in WAYS if way in medium]
+    if not said:
+        # Not where a key may be one of them, misspelt, which is reported.
+        if not [key for key in medium if key != "absorption"]:
+            expected = f"a number ≥ 0.001 and ≤ 1000, or one of {', '.join(WAYS[1:])} instead"
+            yield Finding((*path, WAYS[0]), "missing", None, expected)
+    elif len(said) > 1:
+        expected = f"either {said[0]} or {said[1]}"
+        yield Finding((*path, said[1]), "the index is said twice", None, expected)
 
 
 def _variants(document: Table) -> Iterator[Finding]:

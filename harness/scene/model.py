@@ -11,14 +11,19 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from harness.scene.media_model import Medium as Medium
+from harness.scene.media_model import Spectrum as Spectrum
+from harness.scene.media_model import Wavelength
 from harness.scene.shape_model import FARTHEST as FARTHEST
 from harness.scene.shape_model import AsMesh as AsMesh
 from harness.scene.shape_model import Box as Box
 from harness.scene.shape_model import Cone as Cone
 from harness.scene.shape_model import Cylinder as Cylinder
+from harness.scene.shape_model import Difference as Difference
 from harness.scene.shape_model import Disk as Disk
 from harness.scene.shape_model import Finite as Finite
 from harness.scene.shape_model import Icosphere as Icosphere
+from harness.scene.shape_model import Intersection as Intersection
 from harness.scene.shape_model import Lens as Lens
 from harness.scene.shape_model import MeshData as MeshData
 from harness.scene.shape_model import MeshFile as MeshFile
@@ -37,6 +42,7 @@ from harness.scene.shape_model import SolidShape as SolidShape
 from harness.scene.shape_model import Sphere as Sphere
 from harness.scene.shape_model import Strict as Strict
 from harness.scene.shape_model import SurfaceShape as SurfaceShape
+from harness.scene.shape_model import Union as Union
 from harness.scene.shape_model import Unit as Unit
 from harness.scene.shape_model import Vec3 as Vec3
 from harness.scene.shape_model import Wedge as Wedge
@@ -108,13 +114,6 @@ Material = Annotated[
 
 
 # --- the scene ------------------------------------------------------------------------------------
-
-
-class Medium(Strict):
-    """`absorption` per scene unit and colour channel: T = exp(-absorption L)."""
-
-    ior: Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)]
-    absorption: Rgb = (0, 0, 0)
 
 
 class Solid(Strict):
@@ -259,6 +258,8 @@ class Case(Strict):
     film: Film = Film()
     camera: Camera
     background: Rgb = (0, 0, 0)
+    wavelength: Wavelength = 587.5618
+    spectrum: Spectrum | None = None
     media: dict[Name, Medium] = Field(default_factory=dict)
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()

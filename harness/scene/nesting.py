@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from harness.scene import resolved
-from harness.scene.containment import bounds, containers, innermost
+from harness.scene.containment import bounds, containers, innermost, surface_samples
 from harness.scene.crosscheck import AIR
 from harness.scene.findings import Attempts, Finding, KeyPath, SceneInvalid, quoted
 from harness.scene.resolved import ResolvedScene, Vec3
@@ -20,6 +20,7 @@ MediumAt = Callable[[Sequence[Vec3]], int]
 
 # Relative to the scene: what is smaller, or nearer, is lost in rounding.
 SMALLEST = 1e-9
+CENTRE = np.zeros(3)
 
 
 def nested(scene: ResolvedScene, camera_medium: str | None) -> ResolvedScene:
@@ -81,6 +82,8 @@ def _extent(scene: ResolvedScene) -> float:
 
 
 def _check_size(member: resolved.Solid | resolved.Surface, extent: float) -> None:
+    if isinstance(member.shape, resolved.Csg) and not surface_samples(member.shape, CENTRE).size:
+        raise SceneInvalid(Finding(("shape",), "nothing is left of it"))
     sizes: dict[KeyPath, float] = {("shape",): smallest_feature(member.shape)}
     if isinstance(member, resolved.Surface) and isinstance(member.material, resolved.ThinSlab):
         sizes["material", "thickness"] = member.material.thickness

@@ -82,6 +82,30 @@ def region(shape: resolved.Analytic) -> Region:
             return _cone(shape)
         case resolved.Lens():
             return _lens(shape)
+        case resolved.Csg():
+            return _composed(shape)
+
+
+def _composed(shape: resolved.Csg) -> Region:
+    first, *others = map(region, shape.parts)
+    match shape.operation:
+        case "union":
+            return Either((first, *others))
+        case "intersection":
+            return Both((first, *others))
+        case "difference":
+            return Both((first, *map(complement, others)))
+
+
+def complement(where: Region) -> Region:
+    """All other points (De Morgan)."""
+    match where:
+        case Side(bound, outside):
+            return Side(bound, not outside)
+        case Both(parts):
+            return Either(tuple(map(complement, parts)))
+        case Either(parts):
+            return Both(tuple(map(complement, parts)))
 
 
 def up_to(height: float, axis: Vec3, origin: Vec3) -> Side:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from harness.scene import model, resolved
 from harness.scene.crosscheck import AIR
+from harness.scene.dispersion import index, wavelengths
 from harness.scene.findings import Attempts, Finding, SceneInvalid, input_error, quoted
 from harness.scene.load import LoadedCase
 from harness.scene.nesting import nested
@@ -27,6 +28,23 @@ def resolve(case: LoadedCase) -> ResolvedScene:
         raise input_error(error.findings, case.file) from None
 
 
+def spectral_media(case: LoadedCase) -> tuple[tuple[float, tuple[resolved.Medium, ...]], ...]:
+    """The scene's media at each wavelength of its spectrum; empty where it has none.
+
+    Raises InputError as `resolve` does.
+    """
+    spectrum = case.model.spectrum
+    if spectrum is None:
+        return ()
+    attempts = Attempts()
+    try:
+        found = attempts.attempt(("spectrum",), wavelengths, spectrum) or ()
+        attempts.raise_any()
+        return tuple((w, _media(case.model, w)[0]) for w in found)
+    except SceneInvalid as error:
+        raise input_error(error.findings, case.file) from None
+
+
 def probe_planes(probe: model.Probe) -> tuple[resolved.Rectangle, ...]:
     """The rectangles on which a probe's rays are caught."""
     return tuple(map(rectangle, probe.planes))
@@ -34,7 +52,7 @@ def probe_planes(probe: model.Probe) -> tuple[resolved.Rectangle, ...]:
 
 def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
     attempts = Attempts()
-    media, medium_of = _media(case)
+    media, medium_of = _media(case, case.wavelength)
     shapes = [
         attempts.attempt(("solids", k, "shape"), solid_shape, solid.shape, folder)
         for k, solid in enumerate(case.solids)
@@ -84,11 +102,22 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
 # --- parts ----------------------------------------------------------------------------------------
 
 
-def _media(case: model.Case) -> tuple[tuple[resolved.Medium, ...], dict[str, int]]:
+def _media(
+    case: model.Case, wavelength: float
+) -> tuple[tuple[resolved.Medium, ...], dict[str, int]]:
     """The media, air first unless the scene says what its air is; and their indices by name."""
     defined = {AIR: model.Medium(ior=1.0), **case.media}
+    attempts = Attempts()
+    air = attempts.attempt(("media", AIR), index, defined[AIR], wavelength, 1.0)
+    iors = {
+        name: attempts.attempt(("media", name), index, medium, wavelength, air or 1.0)
+        for name, medium in defined.items()
+        if name != AIR
+    }
+    attempts.raise_any()
+    iors[AIR] = air
     media = tuple(
-        resolved.Medium(name=name, ior=medium.ior, absorption=medium.absorption)
+        resolved.Medium(name=name, ior=iors[name] or 1.0, absorption=medium.absorption)
         for name, medium in defined.items()
     )
     return media, {name: k for k, name in enumerate(defined)}

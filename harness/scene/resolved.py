@@ -136,10 +136,27 @@ class Disk(Frozen):
     radius: float
 
 
-Analytic = Sphere | Convex | Cylinder | Cone | Lens
-SolidShape = Annotated[Sphere | Convex | Cylinder | Cone | Lens | Mesh, Field(discriminator="type")]
+class Csg(Frozen):
+    """Solids composed as sets: what is in any, in all, or in the first and none of the others.
+
+    Parts may share faces; in a union these are none of it, in a difference they are.
+    """
+
+    type: Literal["csg"] = "csg"
+    operation: Literal["union", "intersection", "difference"]
+    parts: tuple[AnalyticShape, ...]
+
+
+Analytic = Sphere | Convex | Cylinder | Cone | Lens | Csg
+AnalyticShape = Annotated[
+    Sphere | Convex | Cylinder | Cone | Lens | Csg, Field(discriminator="type")
+]
+SolidShape = Annotated[
+    Sphere | Convex | Cylinder | Cone | Lens | Csg | Mesh, Field(discriminator="type")
+]
 SurfaceShape = Annotated[
-    Sphere | Convex | Cylinder | Cone | Lens | Mesh | Rectangle | Disk, Field(discriminator="type")
+    Sphere | Convex | Cylinder | Cone | Lens | Csg | Mesh | Rectangle | Disk,
+    Field(discriminator="type"),
 ]
 
 
@@ -263,6 +280,7 @@ class Solid(Frozen):
     shape: SolidShape
     medium: int
     exterior: int
+    priority: int = 0
 
 
 class Surface(Frozen):

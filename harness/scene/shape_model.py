@@ -172,6 +172,46 @@ class AsMesh(Strict):
     of: Annotated[Box | Slab | Prism | Wedge, Field(discriminator="type")]
 
 
+class Composed(Strict):
+    """Solids composed as sets; each part has a place of its own."""
+
+    of: Annotated[tuple[AnalyticShape, ...], Field(min_length=2)]
+
+
+class Union(Composed):
+    """What is in any of the parts; faces that they share are none of it."""
+
+    type: Literal["union"]
+
+
+class Intersection(Composed):
+    """What is in all of the parts."""
+
+    type: Literal["intersection"]
+
+
+class Difference(Composed):
+    """What is in the first part and in none of the others."""
+
+    type: Literal["difference"]
+
+
+AnalyticShape = Annotated[
+    Sphere
+    | Box
+    | Slab
+    | Prism
+    | Wedge
+    | Cylinder
+    | Cone
+    | Lens
+    | Union
+    | Intersection
+    | Difference,
+    Field(discriminator="type"),
+]
+
+
 class Rectangle(Placed):
     """Open face; `normal` points to its front, `up` gives the direction of its v coordinate."""
 
@@ -199,6 +239,9 @@ SolidShape = Annotated[
     | Cylinder
     | Cone
     | Lens
+    | Union
+    | Intersection
+    | Difference
     | Icosphere
     | MeshFile
     | MeshData

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from harness.scene import lenses, model, resolved
 from harness.scene.degrees import cosd, sind
-from harness.scene.findings import Finding, SceneInvalid, quoted
+from harness.scene.findings import Attempts, Finding, SceneInvalid, quoted
 from harness.scene.resolved import Vec3
 from harness.scene.vectors import (
     IDENTITY,
@@ -72,6 +72,8 @@ def solid_shape(shape: model.SolidShape, folder: Path) -> resolved.SolidShape:
             return lenses.cone(shape, _along_axis(shape, shape.center))
         case model.Lens():
             return lenses.lens(shape, _along_axis(shape, shape.vertex))
+        case model.Union() | model.Intersection() | model.Difference():
+            return _composed(shape, folder)
         case model.Icosphere():
             return _icosphere(shape)
         case model.MeshFile() | model.MeshData():
@@ -135,6 +137,18 @@ def _face_frame(shape: model.Rectangle | model.Disk | model.Wedge) -> resolved.F
             )
         )
     return _turned_frame(base, turn_of(shape))
+
+
+def _composed(
+    shape: model.Union | model.Intersection | model.Difference, folder: Path
+) -> resolved.Csg:
+    attempts = Attempts()
+    parts = [
+        attempts.attempt(("of", k), solid_shape, part, folder) for k, part in enumerate(shape.of)
+    ]
+    attempts.raise_any()
+    analytic = tuple(part for part in parts if isinstance(part, resolved.Analytic))
+    return resolved.Csg(operation=shape.type, parts=analytic)
 
 
 def _along_axis(shape: model.Cylinder | model.Cone | model.Lens, origin: Vec3) -> resolved.Frame:
@@ -322,6 +336,8 @@ def smallest_feature(shape: resolved.SurfaceShape) -> float:
             return min(shape.radius, shape.height)
         case resolved.Lens():
             return min(shape.aperture, shape.thickness)
+        case resolved.Csg():
+            return min(map(smallest_feature, shape.parts))
         case resolved.Rectangle():
             return min(shape.size)
         case resolved.Mesh():

@@ -45,6 +45,8 @@ def _thickness(shape: rs.SolidShape) -> float:
             planes = np.array(shape.planes)
             depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
             return float(depths.min())
+        case rs.Csg():
+            return min(map(_thickness, shape.parts))
         case rs.Mesh():
             return float(np.ptp(np.array(shape.vertices), axis=0).min())
 
@@ -130,6 +132,8 @@ def _scaled_shape(shape: rs.SurfaceShape, factor: float) -> rs.SurfaceShape:
                 "radii": tuple(None if r is None else r * factor for r in shape.radii),
                 "aperture": shape.aperture * factor,
             }
+        case rs.Csg():
+            update = {"parts": tuple(_scaled_shape(part, factor) for part in shape.parts)}
         case rs.Rectangle():
             width, height = shape.size
             update = {

@@ -181,7 +181,7 @@ class _Writer:
         """POV-Ray takes a camera inside a shape to be in its medium, unless it is inverted."""
         origin = np.array([self.scene.camera.origin])
         match shape:  # faces and meshes without inside_vector have no inside
-            case rs.Sphere() | rs.Convex() | rs.Cylinder() | rs.Cone() | rs.Lens():
+            case rs.Sphere() | rs.Convex() | rs.Cylinder() | rs.Cone() | rs.Lens() | rs.Csg():
                 if signed_distance(shape, origin)[0] < 0:
                     return shape_text(shape, texture, "hollow inverse")
         return shape_text(shape, texture, "hollow")

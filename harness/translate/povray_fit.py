@@ -63,6 +63,8 @@ def thickness(shape: rs.SolidShape) -> float:
             planes = np.array(shape.planes)
             depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
             return float(depths.min())
+        case rs.Csg():
+            return min(map(thickness, shape.parts))
         case rs.Mesh():
             return float(np.ptp(np.array(shape.vertices), axis=0).min())
 
@@ -86,7 +88,7 @@ def _extent(shape: rs.SurfaceShape) -> float:
             return float(np.abs(shape.vertices).max())
         case rs.Cylinder():
             return float(np.abs(shape.frame.origin).max()) + shape.radius + shape.height / 2
-        case rs.Cone() | rs.Lens():
+        case rs.Cone() | rs.Lens() | rs.Csg():
             return float(np.abs(bounds(shape)).max())
         case rs.Rectangle():
             return float(np.abs(shape.frame.origin).max()) + math.hypot(*shape.size) / 2

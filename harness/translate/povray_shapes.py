@@ -37,6 +37,10 @@ def shape_text(shape: rs.SurfaceShape, *modifiers: str, solid: bool = False) -> 
             head = f"cone {{ {ends}"
         case rs.Lens():
             head = "\n".join(("intersection {", *_parts(region(shape))))
+        case rs.Csg():
+            # A union would show the faces that one part has inside another.
+            kind = "merge" if shape.operation == "union" else shape.operation
+            head = "\n".join((f"{kind} {{", *map(shape_text, shape.parts)))
         case rs.Mesh():
             return _mesh(shape, body, solid)
         case rs.Rectangle():

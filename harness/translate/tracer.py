@@ -24,7 +24,7 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
     return tracer.scene.Scene(
         camera=_camera(scene.camera),
         solids=tuple(
-            tracer.scene.Solid(_solid_shape(s.shape), media[s.medium], media[s.exterior], s.name)
+            tracer.scene.Solid(_solid_shape(s.shape), media[s.medium], s.priority, s.name)
             for s in scene.solids
         ),
         surfaces=tuple(
@@ -35,7 +35,7 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
             tracer.scene.PointLight(light.position, light.intensity) for light in scene.lights
         ),
         background=scene.background,
-        around_camera=media[scene.camera.medium],
+        ambient=media[0],
         transport=tracer.scene.Transport(
             max_depth=transport.max_depth,
             min_weight=transport.min_weight,
@@ -56,9 +56,16 @@ def _camera(
             return tracer.camera.Orthographic(*axes, camera.width)
 
 
-def _solid_shape(
-    shape: resolved.SolidShape,
-) -> tracer.scene.SolidShape:
+def _solid_shape(shape: resolved.SolidShape) -> tracer.scene.SolidShape:
+    if isinstance(shape, resolved.Mesh):
+        normals = None if shape.normals is None else np.array(shape.normals, float)
+        return tracer.mesh.Mesh(
+            np.array(shape.vertices, float), np.array(shape.triangles, np.int64), normals
+        )
+    return _analytic(shape)
+
+
+def _analytic(shape: resolved.Analytic) -> tracer.solids.Analytic:
     match shape:
         case resolved.Sphere():
             return tracer.shapes.Sphere(shape.center, shape.radius)
@@ -82,11 +89,19 @@ def _solid_shape(
                 shape.aperture,
                 shape.conics,
             )
-        case resolved.Mesh():
-            normals = None if shape.normals is None else np.array(shape.normals, float)
-            return tracer.mesh.Mesh(
-                np.array(shape.vertices, float), np.array(shape.triangles, np.int64), normals
-            )
+        case resolved.Csg():
+            return _composed(shape)
+
+
+def _composed(shape: resolved.Csg) -> tracer.solids.Compound:
+    first, *others = map(_analytic, shape.parts)
+    match shape.operation:
+        case "union":
+            return tracer.solids.union(first, *others)
+        case "intersection":
+            return tracer.solids.intersection(first, *others)
+        case "difference":
+            return tracer.solids.difference(first, *others)
 
 
 def _shape(shape: resolved.SurfaceShape) -> tracer.scene.Shape:

@@ -85,6 +85,20 @@ def fork(output: Path, width: int, height: int) -> None:
     (output.parent / "left.json").write_text(json.dumps(left))
 
 
+def fork_bomb(output: Path, width: int, height: int) -> None:
+    for _ in range(2000):
+        if os.fork() == 0:
+            time.sleep(600)
+        time.sleep(0.001)
+
+
+def many_files(output: Path, width: int, height: int) -> None:
+    """Each of them small enough."""
+    for k in range(100_000):
+        with (output.parent / f"{k}.tmp").open("wb") as file:
+            os.posix_fallocate(file.fileno(), 0, 8 << 20)
+
+
 def flood(output: Path, width: int, height: int) -> None:
     while True:
         os.write(1, b"All work and no play makes a dull renderer. " * 1000 + b"\n")
@@ -147,6 +161,8 @@ MODES: dict[str, Callable[[Path, int, int], None]] = {
         leak,
         leak_in_child,
         fork,
+        fork_bomb,
+        many_files,
         flood,
         flood_file,
         truncated,

@@ -94,6 +94,28 @@ def test_what_lies_inside_a_lens() -> None:
     assert relation(solid(sphere(0.3, 0, 0, 0.2)), hollow, 1e-9) == Relation.OVERLAP
 
 
+def test_composed_solids_are_sets() -> None:
+    """A point is in a composed solid as its parts say, by the signs of their distances."""
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1.5, 1.5, (4000, 3))
+    a, b, c = (
+        sphere(1),
+        {"type": "box", "size": [1, 2, 1]},
+        {"type": "cone", "radius": 1, "height": 1},
+    )
+    inside = [signed_distance(solid(part), points) < 0 for part in (a, b, c)]
+    for name, expected in (
+        ("union", inside[0] | inside[1] | inside[2]),
+        ("intersection", inside[0] & inside[1] & inside[2]),
+        ("difference", inside[0] & ~inside[1] & ~inside[2]),
+    ):
+        shape = solid({"type": name, "of": [a, b, c]})
+        assert ((signed_distance(shape, points) < 0) == expected).all()
+        low, high = bounds(shape)
+        assert (points[expected] >= low).all()
+        assert (points[expected] <= high).all()
+
+
 MISTAKES = {
     "crossing faces": (
         lens(radii=[2, -2], thickness=0.1),
@@ -112,6 +134,14 @@ MISTAKES = {
     "a wedge that ends": (
         {"type": "wedge", "thickness": 0.1, "angle": 20, "size": [1, 1]},
         ("solids[0].shape.thickness", "too thin for its angle"),
+    ),
+    "nothing left": (
+        {"type": "intersection", "of": [sphere(1), sphere(1, 3)]},
+        ("solids[0].shape", "nothing is left of it"),
+    ),
+    "a mistake in a part": (
+        {"type": "union", "of": [sphere(1), lens(radii=[-0.9, 3])]},
+        ("solids[0].shape.of[1].diameter", "wider than its front face reaches"),
     ),
     "no axis": (lens(axis=[0, 0, 0]), ("solids[0].shape.axis", "has no direction")),
 }

@@ -142,7 +142,8 @@ def test_case_names_are_fit_for_files() -> None:
 # --- what does not --------------------------------------------------------------------------------
 
 SHAPES = (
-    "box, cone, cylinder, icosphere, lens, mesh, polygons, prism, slab, sphere, triangles or wedge"
+    "box, cone, cylinder, difference, icosphere, intersection, lens, mesh, polygons, prism, slab, "
+    "sphere, triangles, union or wedge"
 )
 EDITS = {
     # name: (old, new, line, key, message, value, expected, suggestion); None matches anything
@@ -163,7 +164,8 @@ EDITS = {
     ),
     "missing key": (
         "ior = 1.5", "",
-        12, "media.glass.ior", "missing", None, "a number ≥ 0.001 and ≤ 1000", None,
+        12, "media.glass.ior", "missing", None,
+        "a number ≥ 0.001 and ≤ 1000, or one of glass, sellmeier, cauchy, abbe instead", None,
     ),
     "missing table": (
         '[camera]\ntype = "perspective"\norigin = [0, 0, 6]\ntarget = [0, 0, 0]\nfov_x = 30', "",

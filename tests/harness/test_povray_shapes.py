@@ -20,6 +20,19 @@ TURNED: Document = {"rotate": [{"axis": [1.0, 0.3, 0.0], "angle": 25.0}]}
 LENS: Document = {"type": "lens", "vertex": [0.0, 0.0, 0.3], "diameter": 1.6, **TURNED}
 INF = math.inf
 
+
+def composed(operation: str, *parts: Document) -> Document:
+    return {"type": operation, "of": list(parts)}
+
+
+def ball(radius: float, x: float, y: float, z: float) -> Document:
+    return {"type": "sphere", "radius": radius, "center": [x, y, z]}
+
+
+def block(width: float, height: float, depth: float, z: float = 0.0) -> Document:
+    return {"type": "box", "size": [width, height, depth], "center": [0.0, 0.0, z]}
+
+
 SHAPES: dict[str, Document] = {
     "biconvex": {**LENS, "radii": [1.5, -1.2], "thickness": 0.8, "diameter": 1.2},
     "biconcave": {**LENS, "radii": [-1.5, 1.2], "thickness": 0.2},
@@ -35,6 +48,24 @@ SHAPES: dict[str, Document] = {
     "cone": {"type": "cone", "radius": 0.8, "height": 1.2, **TURNED},
     "frustum": {"type": "cone", "radius": 0.8, "top_radius": 0.3, "height": 1.2, **TURNED},
     "wedge": {"type": "wedge", "thickness": 0.5, "angle": 15.0, "size": [1.5, 1.2], **TURNED},
+    "moon": composed("difference", ball(1.0, 0.0, 0.0, 0.0), ball(0.7, 0.5, 0.0, 0.6)),
+    "drilled": composed(
+        "difference",
+        {**block(1.4, 1.4, 1.0), **TURNED},
+        {"type": "cylinder", "center": [0.2, 0.1, 0.0], "axis": [0.1, 0.2, 1.0], "radius": 0.2,
+         "height": 4.0},
+    ),
+    "parts that touch": composed("union", block(1.0, 1.0, 0.5, 0.25), block(1.4, 1.4, 0.5, -0.25)),
+    "parts that overlap": composed("union", block(1.0, 1.0, 1.0, 0.25), ball(0.8, 0.3, 0.0, -0.2)),
+    "composed of composed": composed(
+        "difference",
+        composed("union", block(1.0, 1.0, 1.0, 0.25), ball(0.8, 0.3, 0.0, -0.2)),
+        composed("intersection", ball(0.5, 0.0, 0.2, 0.5), block(2.0, 0.8, 2.0)),
+    ),
+    "half a lens": composed(
+        "intersection", {**LENS, "radii": [1.5, -1.2], "thickness": 0.8, "diameter": 1.2},
+        {"type": "box", "center": [1.0, 0.0, 0.0], "size": [2.0, 4.0, 4.0]},
+    ),
 }  # fmt: skip
 
 

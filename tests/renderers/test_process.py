@@ -155,3 +155,18 @@ def remaining(folder: Path) -> list[int]:
         if any(str(folder) in part for part in process.info["cmdline"] or [])
         and not is_zombie(process.pid)
     ]
+
+
+def test_too_many_processes(tmp_path: Path) -> None:
+    with pytest.raises(RendererFailed, match="started more than 256 processes"):
+        run("fork-bomb", tmp_path, memory_mb=1_000_000)
+
+
+def test_many_files_that_are_small_enough_each(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.json"
+    scene.write_text(json.dumps({"film": {"width": 8, "height": 6}}))
+    argv = [sys.executable, str(MISBEHAVE), "many-files", str(scene), str(tmp_path / "image.npy")]
+    with pytest.raises(RendererFailed, match="wrote more than 16 MB of files"):
+        run_limited(
+            argv, cwd=tmp_path, timeout_s=20, memory_mb=512, output_mb=16, private=tmp_path
+        )  # fmt: skip

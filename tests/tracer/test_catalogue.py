@@ -142,7 +142,6 @@ def test_diffuse_reflectance(row: Row) -> None:
         camera,
         (ball,),
         background=(1.0, 1.0, 1.0),
-        around_camera=Medium(ior),
         transport=Transport(2, 0.0, radiance_n2=True),
     )
     R = ((ior - 1) / (ior + 1)) ** 2
@@ -406,7 +405,7 @@ def test_aplanatic_points(row: Row) -> None:
     """All light from R/n inside a ball seems to come from nR."""
     radius, ior = numbers(row.p)
     inner, virtual = numbers(row.v)
-    scene = replace(glass(Sphere((0.0, 0.0, 0.0), radius), ior), around_camera=Medium(ior))
+    scene = glass(Sphere((0.0, 0.0, 0.0), radius), ior)
     for theta in (1.0, 20.0, 60.0, 85.0):
         found = one(scene, (0.0, 0.0, -inner), (sind(theta), 0.0, cosd(theta)), "T")
         crossing = axis_crossing(found.vertices[0, 1], found.direction[0])
@@ -469,7 +468,7 @@ def test_apparent_depth(row: Row) -> None:
     """Where neighbouring rays from the bottom of a pool seem to meet, in and across the plane."""
     depth, theta, ior = numbers(row.p)
     paraxial, tangential, sagittal = numbers(row.v)
-    scene = replace(glass(slab(50.0), ior), around_camera=Medium(ior))
+    scene = glass(slab(50.0), ior)
     inside = math.asin(sind(theta) / ior)
     h = 1e-5
 

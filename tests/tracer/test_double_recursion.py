@@ -74,7 +74,7 @@ def test_rays_are_counted_at_any_depth(depth: int) -> None:
 
 BALL = Solid(Sphere((0.0, 0.0, 0.0), 1.0), Medium(1.5))
 ROD = Solid(cylinder((0.0, 0.0, 0.0), (0.6, 0.0, 0.8), 0.5, 1.5), Medium(2.4))
-CORE = Solid(Sphere((0.0, 0.0, 0.0), 0.5), Medium(1.1), Medium(1.5))
+CORE = Solid(Sphere((0.0, 0.0, 0.0), 0.5), Medium(1.1))
 CAMERA = Perspective((0.0, 0.0, 6.0), X, Y, (0.0, 0.0, -1.0), 0.2)
 
 

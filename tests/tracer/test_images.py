@@ -112,7 +112,6 @@ def test_radiance_scales_with_the_square_of_the_index_on_demand() -> None:
         Orthographic((0.0, 0.0, 0.0), X, Y, (0.0, 0.0, -1.0), 1e-9),
         (BALL,),
         background=WHITE,
-        around_camera=GLASS,
         transport=Transport(2, 0.0),
     )
     assert render(inside, 1, 1).pixels[0, 0] == pytest.approx(0.96, rel=1e-14)

@@ -110,7 +110,7 @@ def test_sequence_by_rayoptics(name: str) -> None:
             shell, core = Medium(n), Medium(1.8)
             balls = (
                 Solid(Sphere((0.0, 0.0, -1.0), 1.0), shell),
-                Solid(Sphere((0.0, 0.0, -1.0), 0.6), core, exterior=shell),
+                Solid(Sphere((0.0, 0.0, -1.0), 0.6), core),
             )
             scene = Scene(glass(slab(1.0), n).camera, balls, (wall(-6.0),))
             surfaces = [(1.0, 0.0, n), (1 / 0.6, 0.4, 1.8), (-1 / 0.6, 1.6, n), (-1.0, 2.0, 1.0)]
@@ -169,7 +169,7 @@ def test_solids_by_raysect(name: str) -> None:
         case _:
             solids = (
                 Solid(Sphere((0.0, 0.0, 0.0), 1.0), shell),
-                Solid(Sphere((0.0, 0.0, 0.0), 0.6), core_glass, exterior=shell),
+                Solid(Sphere((0.0, 0.0, 0.0), 0.6), core_glass),
             )
             theirs = [
                 primitive.Sphere(1.0, material=dielectric(1.5, 1.0)),

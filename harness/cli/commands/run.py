@@ -19,6 +19,7 @@ from harness.cli.options import (
     renderer_option,
     scenes_option,
 )
+from harness.cli.shards import divided
 
 
 @click.command(name="run")
@@ -34,12 +35,35 @@ from harness.cli.options import (
     show_default=True,
     help="Let approved results stand in for renderers that are missing.",
 )
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0.1),
+    default=120.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="After which a render counts as hung.",
+)
+@click.option(
+    "--memory",
+    type=click.IntRange(64),
+    default=4096,
+    show_default=True,
+    metavar="MB",
+    help="That a renderer may use.",
+)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @quality_option
 @scenes_option
 @cache_option
 @click.option("--no-cache", is_flag=True, help="Neither use nor keep results of other runs.")
 @click.option("--fresh", is_flag=True, help="Begin anew where a run into OUT was interrupted.")
+@click.option("--shard", metavar="I/N", help="Only the I-th of N parts; `merge` joins them.")
+@click.option(
+    "--times",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="The times.json of an earlier run, to balance shards by.  [default: times.json in the "
+    "folder of scenes]",
+)
 @reports_errors
 def command(
     case: tuple[str, ...],
@@ -49,12 +73,16 @@ def command(
     out: Path,
     jobs: int | None,
     stored: bool,
+    timeout: float,
+    memory: int,
     seed: int,
     quality: str,
     scenes: Path | None,
     cache_at: str,
     no_cache: bool,
     fresh: bool,
+    shard: str | None,
+    times: Path | None,
 ) -> None:
     """Render CASEs (all of them, or those a glob like "slab-*" selects) and judge them.
 
@@ -74,22 +102,31 @@ def command(
     from harness.report import write_report
     from harness.run import HELPER, UNFINISHED
     from harness.run import run as run_cases
+    from harness.shard import NOTE, write_note
 
     chosen = chosen_renderers(renderers, commands, configs)
     cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
     helper = next((r for r in chosen if r.name == HELPER), None) or registry.create(HELPER)
+    note = None
+    if shard is not None:
+        settings = f"{quality}, seed {seed}, stored {stored}"
+        cases, note = divided(shard, cases, [r.name for r in chosen], settings, times, scenes)
     line = " ".join(["snellcheck", *sys.argv[1:]])
     cache = None if no_cache else open_cache(cache_at)
     if fresh:
         shutil.rmtree(out / UNFINISHED, ignore_errors=True)
+    (out / NOTE).unlink(missing_ok=True)
     with show.progress() as progress, terminable():
         summary = run_cases(
             cases, chosen, helper, out, quality=quality, threads=jobs or core_count(), seed=seed,
-            command=line, report=progress, cache=cache, must_run=renderers,
+            timeout_s=timeout, memory_mb=memory, command=line, report=progress, cache=cache,
+            must_run=renderers,
             stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
         )  # fmt: skip
     if cache is not None and cache.trouble:
         click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)
+    if note is not None:
+        write_note(out, note)
     index = write_report(out)
     show.verdicts(summary, index)
     sys.exit(summary.exit_code)

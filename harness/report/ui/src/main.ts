@@ -1,5 +1,6 @@
 // The report's script: a classic one, so that it runs from file://. All is readable without it.
 
+import { offerApproval, showApprovals } from "./approvals";
 import type { CaseData } from "./case";
 import { bindCaseKeys, startCase } from "./casepage";
 import { dataBlock } from "./dom";
@@ -10,6 +11,7 @@ document.documentElement.classList.add("scripted");
 
 function start(): void {
   const data = dataBlock<CaseData>("case-data");
+  const run = document.querySelector<HTMLMetaElement>('meta[name="snellcheck-run"]')?.content ?? "";
   let help: HTMLDialogElement | null = null;
   const toggleHelp = (): void => {
     help ??= helpDialog();
@@ -18,8 +20,12 @@ function start(): void {
   };
   if (data) {
     bindCaseKeys(data, document);
+    offerApproval(run, data.id, document);
     void startCase(data, document);
-  } else startMatrix();
+  } else {
+    startMatrix();
+    showApprovals(run);
+  }
   bind("Everywhere", "?", "these keys", ["?"], toggleHelp);
   document.getElementById("help")?.addEventListener("click", toggleHelp);
   listen();

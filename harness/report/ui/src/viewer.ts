@@ -484,7 +484,7 @@ export class Viewer {
 
 /** As many columns as make the panes largest, and the height that each may have. */
 function arranged(panes: number, width: number, shape: number): { columns: number; room: number } {
-  const height = Math.max(300, innerHeight * 0.72);
+  const height = Math.max(300, Math.min(innerHeight, 1200) * 0.72);
   let best = { columns: 1, room: height };
   let widest = 0;
   for (let columns = 1; columns <= Math.min(panes, 4); columns++) {

@@ -1,0 +1,37 @@
+"""`snellcheck merge`: shards become one run."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from harness.cli.errors import reports_errors
+from harness.cli.options import DEFAULT_OUT, prepared_cases, scenes_option
+
+
+@click.command(name="merge")
+@click.argument("folder", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), default=DEFAULT_OUT, show_default=True)
+@scenes_option
+@reports_errors
+def command(folder: tuple[Path, ...], out: Path, scenes: Path | None) -> None:
+    """Put the runs in FOLDERs, made with --shard, together; the exit code is that of the whole.
+
+    Refuses shards that are missing, given twice, interrupted, or not of the same suite.
+    """
+    from harness import show
+    from harness.errors import InputError
+    from harness.merge import merge
+    from harness.report import write_report
+
+    line = " ".join(["snellcheck", *sys.argv[1:]])
+    try:
+        cases = prepared_cases((), "normal", scenes)
+    except InputError:  # scenes that are not here can still be merged
+        cases = []
+    summary = merge(folder, out, cases, line)
+    index = write_report(out)
+    show.verdicts(summary, index)
+    sys.exit(summary.exit_code)

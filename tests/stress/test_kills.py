@@ -1,0 +1,132 @@
+"""kill -9 of a run at any moment: nothing lost, nothing rendered twice, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from harness import record
+from harness.cache.cache import open_cache
+from harness.record import CaseRecord
+from harness.run import UNFINISHED
+from tests.stress.figures import count, note
+
+ROOT = Path(__file__).parents[2]
+KILLABLE = "from tests.stress.killable import main; import sys; main(*sys.argv[1:])"
+# Each of the three lanes may have finished an image and be about to keep it.
+UNDER_WAY = 3
+CASES = ["snell", "slab", "ball", "tir"]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a run writes."""
+
+    root: Path
+
+    @property
+    def out(self) -> Path:
+        return self.root / "out"
+
+    @property
+    def log(self) -> Path:
+        return self.root / "log"
+
+    def start(self) -> subprocess.Popen[str]:
+        self.root.mkdir(exist_ok=True)
+        places = (self.out, self.root / "cache", self.log)
+        return subprocess.Popen(
+            [sys.executable, "-c", KILLABLE, *map(str, places), *CASES],
+            cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+
+    def finish(self) -> dict[str, object]:
+        out, err = self.start().communicate()
+        assert out, err
+        return dict(json.loads(out))
+
+    def rendered(self) -> Counter[str]:
+        return Counter(self.log.read_text().splitlines() if self.log.exists() else [])
+
+    def records(self) -> list[CaseRecord]:
+        return [record.read_case(path) for path in sorted((self.out / "records").glob("*.json"))]
+
+
+def check_what_is_there(place: Place) -> None:
+    """Every file that has its final name is whole, and every record has all of its files."""
+    for written in place.records():
+        named = [i.path for run in written.runs for i in run.images]
+        named += [i.picture for run in written.runs for i in run.images if i.picture]
+        named += [d.path for d in written.differences] + list(written.files.values())
+        for path in named:
+            assert (place.out / path).stat().st_size > 0
+    if (place.out / "summary.json").exists():
+        record.read_summary(place.out / "summary.json")
+    assert open_cache(str(place.root / "cache")).verify().removed == {}
+
+
+def timeless(written: CaseRecord) -> CaseRecord:
+    runs = [run.model_copy(update={"render_s": 0.0}) for run in written.runs]
+    return written.model_copy(update={"started": "", "wall_s": 0.0, "runs": runs})
+
+
+def kill_after(place: Place, images: int, delay_s: float) -> bool:
+    """Starts a run, kills it `delay_s` after it has rendered so many more images; False: too late.
+
+    Images rather than seconds, since a run takes longer to start than to work.
+    """
+    goal = place.rendered().total() + images
+    process = place.start()
+    while process.poll() is None and place.rendered().total() < goal:
+        time.sleep(0.002)
+    time.sleep(delay_s)
+    if process.poll() is not None:
+        process.communicate()
+        return False
+    os.kill(process.pid, signal.SIGKILL)
+    process.communicate()
+    return True
+
+
+@pytest.mark.slow
+def test_killed_again_and_again_a_run_ends_as_if_nothing_had_happened(tmp_path: Path) -> None:
+    whole = Place(tmp_path / "whole")
+    verdicts = whole.finish()
+    expected = whole.rendered()
+    assert set(expected.values()) == {1}
+    wanted, dice = count(4, 100), random.Random(6)
+    kills = rounds = twice = 0
+    while kills < wanted:
+        place = Place(tmp_path / f"round-{rounds}")
+        rounds += 1
+        mine = 0
+        while kills < wanted:
+            images = dice.randint(0, max(2, expected.total() // 3))
+            if not kill_after(place, images, dice.random() * 0.03):
+                break
+            kills, mine = kills + 1, mine + 1
+            check_what_is_there(place)
+        assert place.finish() == verdicts
+        assert not (place.out / UNFINISHED).exists()
+        rendered = place.rendered()
+        assert set(rendered) == set(expected)
+        again = rendered.total() - expected.total()
+        assert again <= UNDER_WAY * mine
+        twice += again
+        assert list(map(timeless, place.records())) == list(map(timeless, whole.records()))
+    note(
+        "kill -9 of a run", "at a random moment, then the same command again", kills,
+        f"{rounds} runs, all ended with the verdicts and records of a run that was not killed; "
+        f"of {expected.total()} images each, {twice} in all were made again: they were finished "
+        "but not yet kept when the kill came",
+    )  # fmt: skip
