@@ -18,6 +18,7 @@ from tests.fuzz.campaign import HANG_S, MOST_MB
 from tests.fuzz.hostile import PICTURE_SCENE, bombs, names, scenes
 from tests.fuzz.targets import MESH_SCENE, ROOT
 from tests.harness.tiny import SCENES
+from tests.stress import figures
 
 # Runs a command line with every file that Python opens written to a log.
 WATCHED = """
@@ -81,11 +82,15 @@ def test_what_asks_for_too_much_is_refused_at_little_cost(what: str, tmp_path: P
             (tmp_path / name).write_bytes(data)
             scene = PICTURE_SCENE if name.endswith(".png") else MESH_SCENE
             files[name] = scene.replace(b"FILE", name.encode())
-    for name, (wrong, refused, seconds, megabytes) in costs(files, tmp_path).items():
+    found = costs(files, tmp_path)
+    for name, (wrong, refused, seconds, megabytes) in found.items():
         assert not wrong, f"{name}: {wrong}"
         assert refused or name in HARMLESS, name
         assert seconds < HANG_S, name
         assert megabytes < MOST_MB, name
+    slowest, most = (max(cost[k] for cost in found.values()) for k in (2, 3))
+    said = f"refused or harmless; at most {slowest:.1f} s and {most:.0f} MB"
+    figures.note("Hostile files", f"{what} that ask for very much", len(found), said)
 
 
 @pytest.fixture
