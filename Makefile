@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references test fuzz lint format lock ui clean
+.PHONY: help setup suite catalogue references findings test fuzz lint format lock ui clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -20,6 +20,10 @@ references: setup ## Measure the committed baselines anew: make references REASO
 	@test -n "$(REASON)" || { echo 'say why: make references REASON="…"'; exit 2; }
 	@$(BIN)/snellcheck run --no-stored --out reports/references
 	@$(BIN)/snellcheck approve '*' --run reports/references --reason "$(REASON)"
+
+findings: setup ## Run the catalogue and write docs/findings.md from its records
+	@$(BIN)/snellcheck run --out reports/findings || test $$? -eq 1
+	@$(BIN)/snellcheck findings reports/findings --out docs/findings.md
 
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2

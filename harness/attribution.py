@@ -43,6 +43,9 @@ def _truth_verdicts(checks: Sequence[Check]) -> dict[str, str | None]:
 def _attribution(
     check: Check, checks: Sequence[Check], failing: Mapping[str, str | None]
 ) -> Attribution:
+    if check.against == "variant":
+        said = f"{check.renderer} is off: it shows two forms of the same scene differently"
+        return Attribution(off=[check.renderer], how="truth", confidence=1.0, sentence=said)
     if check.against == "truth":
         said = f"{check.renderer} is off: it differs from the closed form"
         return Attribution(off=[check.renderer], how="truth", confidence=1.0, sentence=said)
@@ -98,7 +101,7 @@ def _groups(checks: Sequence[Check]) -> list[frozenset[str]]:
 
 
 def _compares(check: Check) -> bool:
-    return check.against != "truth" and check.status in (Verdict.PASS, *DIFFERS)
+    return check.against not in ("truth", "variant") and check.status in (Verdict.PASS, *DIFFERS)
 
 
 def most_likely_right(groups: Sequence[frozenset[str]]) -> tuple[frozenset[str], float]:

@@ -82,6 +82,16 @@ class RendererFailed(RendererError):
     """The renderer crashed, hung, ran out of memory or wrote something unreadable: ERROR."""
 
 
+class ImageNotFinite(RendererFailed):
+    """An image holds NaN or infinity: ERROR. `pixels` are where, row by row from the top left."""
+
+    def __init__(self, pixels: Iterable[int], *, width: int, log: str = "") -> None:
+        self.pixels = tuple(pixels)
+        y, x = divmod(self.pixels[0], width)
+        message = f"wrote NaN or infinity in {len(self.pixels)} pixels, first at ({x}, {y})"
+        super().__init__(message, log=log)
+
+
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name closest to `name`, or None where nothing is close."""
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)

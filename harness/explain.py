@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -11,14 +11,16 @@ from harness.camera import primary_rays
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
 from harness.diagnosis.whole_run import Witness, diagnose_run
+from harness.errors import ImageNotFinite
 from harness.measure.comparison import Unmeasurable
+from harness.measure.images import Pixels
 from harness.measure.observables import Observable
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.rays import RayMeasurement
 from harness.plan import PreparedCase
-from harness.record import Check, Diagnosis, SummaryCase, Verdict
+from harness.record import Cause, Check, Diagnosis, SummaryCase, Verdict
 from harness.renderers.base import Capability, Rays, Status
-from harness.results import Contender, NotAvailable, Results
+from harness.results import FAILED_PREFLIGHT, Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolve import expand_thin_slabs
 from harness.scene.resolved import ThinSlab
@@ -66,10 +68,21 @@ class Explainer:
             isinstance(s.material, ThinSlab) for s in self._case.scene.surfaces
         )
         if probe.measure == "light":
-            pixels = self._results.picture(contender, plan.light_role(probe))
+            pixels = self._lit(contender, probe)
             n2 = Capability.RADIANCE_N2 in contender.capabilities
             return levels(truth, pixels, precision, preflight.quantum, preflight.samples, n2, thin)
         return landings(truth, self._measured(contender, probe), precision, thin)
+
+    def _lit(self, contender: Contender, probe: model.Probe) -> Pixels:
+        """The picture; where it was refused for pixels that are no numbers, truth but for these."""
+        role = plan.light_role(probe)
+        refused = self._results.by_role.get((contender.name, role))
+        if not isinstance(refused, ImageNotFinite):
+            return self._results.picture(contender, role)
+        level = np.nan_to_num(self._truth_of(probe).level)
+        level[list(refused.pixels)] = np.nan
+        shape = (self._results.height, self._results.width, 3)
+        return np.asarray(level.reshape(shape), np.float32)
 
 
 # --- a run ----------------------------------------------------------------------------------------
@@ -85,16 +98,44 @@ POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
 
 
 def explain_run(
-    cases: Sequence[PreparedCase], judged: Sequence[SummaryCase], renderers: Sequence[str]
+    cases: Sequence[PreparedCase], judged: Sequence[SummaryCase], renderers: Mapping[str, str]
 ) -> list[Diagnosis]:
-    """Why each renderer is off in this run; nothing of those that are not."""
+    """Why each renderer is off in this run; nothing of those that are not.
+
+    `renderers` are named with the reason why they are out, which is "" where they are not.
+    """
     found: list[Diagnosis] = []
-    for renderer in renderers:
+    for renderer, reason in renderers.items():
+        _, failed, findings = reason.partition(FAILED_PREFLIGHT)
+        if failed:
+            found.append(explain_preflight(renderer, findings))
         by_case = {c.id: d for c in judged for d in c.diagnoses if d.renderer == renderer}
         if by_case:
             witnesses = list(_witnesses(cases, judged, renderer))
             found += diagnose_run(renderer, by_case, witnesses)
     return found
+
+
+def explain_preflight(name: str, findings: str) -> Diagnosis:
+    """The diagnosis of a renderer that failed its calibration: its findings name the cause."""
+    cause = next((c for words, c in NAMED.items() if words in findings), "preflight")
+    return Diagnosis(
+        renderer=name, sentence=f"{name} fails its preflight: {findings}",
+        cause=Cause(id=cause, sentence=findings, residual=0.0, explains=1.0),
+    )  # fmt: skip
+
+
+# What the findings of a preflight say, and the hypotheses that say the same.
+NAMED = {
+    "mirrored in x": "mirrored-x",
+    "mirrored in y": "mirrored-y",
+    "rotated by 180": "rotated-180",
+    "is shifted by": "pixel-shift",
+    "field of view is off": "field-of-view",
+    "field of view": "fov-axis",
+    "encoded": "gamma",
+    "scaled: radiance": "gain",
+}
 
 
 def _witnesses(
@@ -109,6 +150,8 @@ def _witnesses(
     }
     files: set[str] = set()
     for case in cases:
+        if any(isinstance(surface.material, ThinSlab) for surface in case.scene.surfaces):
+            continue  # what a renderer does there need not be what it does at solids
         if case.loaded.id in right and case.loaded.case not in files and case.loaded.model.probes:
             files.add(case.loaded.case)
             if len(files) > MOST_WITNESSES:

@@ -15,6 +15,7 @@ from harness.explain import Explainer
 from harness.measure import (
     flat_observables,
     focus_observables,
+    furnace,
     light_observables,
     radiance,
     ray_observables,
@@ -63,6 +64,7 @@ RAYS = {
     Observable.BACK_FOCAL_LENGTH: focus_observables.back_focal_length,
     Observable.SPHERICAL_ABERRATION: focus_observables.spherical_aberration,
     Observable.APLANATIC_IMAGE: focus_observables.aplanatic_image,
+    Observable.CARTESIAN_FOCUS: focus_observables.cartesian_focus,
     Observable.RAINBOW_ANGLE: focus_observables.rainbow_angle,
     Observable.OPTICAL_LENGTH: optical_length,
 }
@@ -126,8 +128,9 @@ class CaseJudge:
         """Those whom the check names, and who have what it is about."""
         api = Observable(spec.observable) in RAY_API_OBSERVABLES
         for contender in self._contenders:
-            named = not spec.renderers or contender.name in spec.renderers
-            if named and (not api or Capability.RAYS in contender.capabilities):
+            if plan.asks(spec, contender.name) and (
+                not api or Capability.RAYS in contender.capabilities
+            ):
                 yield contender
 
     def _in_all_forms(
@@ -199,6 +202,10 @@ class CaseJudge:
         if observable in IMAGE_OBSERVABLES:
             picture = self._results.picture(contender, plan.IMAGE)
             level = FALSE_ALARM if preflight.noisy else None
+            if furnace.is_furnace(self._case.scene):
+                return furnace.energy(
+                    self._case.scene, picture, preflight.quantum, precision, level
+                )
             return radiance.against_truth(
                 self._case.scene, picture, preflight.quantum, precision, level
             )

@@ -27,7 +27,7 @@ from harness.preflight import Render, preflight
 from harness.record import Verdict
 from harness.renderers.base import Image, RayTracingRenderer, Renderer, RenderSettings
 from harness.renderers.process_tree import Running, belong_to
-from harness.results import Contender, Result
+from harness.results import FAILED_PREFLIGHT, Contender, Result
 from harness.scene.resolved import ResolvedScene
 
 # With less room than this in the temporary folder, a failure to write is the disk's.
@@ -207,9 +207,9 @@ def calibrate(
     except RendererMissing as error:
         return _out(name, Verdict.SKIP, f"not installed: {error}")
     except RendererError as error:
-        return _out(name, Verdict.ERROR, f"failed its preflight: {error}{_tail(error)}", version)
+        return _out(name, Verdict.ERROR, f"{FAILED_PREFLIGHT}{error}{_tail(error)}", version)
     if found.findings:
-        reason = "failed its preflight: " + "; ".join(found.findings)
+        reason = FAILED_PREFLIGHT + "; ".join(found.findings)
         return _out(name, Verdict.ERROR, reason, version)
     return Contender(name, version, renderer.capabilities, found)
 

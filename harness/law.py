@@ -76,11 +76,12 @@ def beer(leg: Leg) -> Float:
 class Law:
     """Each rule on its own, for all rays at once; the defaults are physics.
 
-    `normal` is what becomes of an interface's normals, `start` where a ray goes on that leaves an
-    interface along its second argument, `transmittance` what weighs a transmitted ray, given R.
+    `normal` is what becomes of an interface's normals, given which are a mesh's, `start` where a
+    ray goes on that leaves an interface along its second argument, `transmittance` what weighs a
+    transmitted ray, given R.
     """
 
-    normal: Callable[[Float], Float] = lambda n: n
+    normal: Callable[[Float, Mask], Float] = lambda n, _: n
     bend: Callable[[Interface], tuple[Float, Mask]] = snell
     reflectance: Callable[[Interface], Float] = fresnel
     transmittance: Callable[[Interface, Float], Float] = lambda _, R: np.asarray(1 - R)

@@ -145,7 +145,9 @@ def _merged(
             "renderers": {name: _renderer(parts, name) for name in first.renderers},
             "counts": Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
             "cases": judged,
-            "diagnoses": explain_run(mine, judged, list(first.renderers)),
+            "diagnoses": explain_run(
+                mine, judged, {name: r.reason for name, r in first.renderers.items()}
+            ),
             "effort": Effort(**{key: sum(e[key] for e in efforts) for key in efforts[0]}),
         }
     )

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.preflight import Preflight
-from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene
+from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene, ramp_scene
+from harness.renderers import registry
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene import model
 from harness.scene.findings import SceneInvalid, input_error
@@ -47,6 +48,13 @@ class Job:
     scene: ResolvedScene
     settings: RenderSettings
     path: str | None = None
+
+
+def asks(check: model.CheckSpec, renderer: str) -> bool:
+    """Whether a check is about `renderer`."""
+    if renderer in registry.ONLY_WHERE_NAMED:
+        return renderer in check.renderers
+    return not check.renderers or renderer in check.renderers
 
 
 @dataclass(frozen=True)
@@ -86,10 +94,16 @@ class PreparedCase:
         probes = self.loaded.model.probes
         return (Form("", self.scene, {p.name: probe_planes(p) for p in probes}), *self.variants)
 
-    @property
-    def wants_images(self) -> bool:
-        """Whether any check looks at pictures."""
-        return any(Observable(c.observable) in IMAGE_OBSERVABLES for c in self.loaded.model.checks)
+    def wants_image(self, renderer: str) -> bool:
+        """Whether any check looks at a picture by `renderer`."""
+        checks = self.loaded.model.checks
+        return any((Observable(c.observable) in IMAGE_OBSERVABLES and asks(c, renderer))
+                   or c.against == renderer for c in checks)  # fmt: skip
+
+    def asked_probes(self, renderer: str) -> list[model.Probe]:
+        """The probes that checks of `renderer` need."""
+        used = {c.probe for c in self.loaded.model.checks if asks(c, renderer)}
+        return [probe for probe in self.loaded.model.probes if probe.name in used]
 
     @property
     def compares_images(self) -> bool:
@@ -157,14 +171,14 @@ def jobs_of(
     """All jobs that `renderer` must do for `case`."""
     scene = scene_for(case.scene, capabilities)
     jobs = []
-    if case.wants_images:
+    if case.wants_image(renderer):
         jobs += _picture(case, Job(renderer, IMAGE, scene, settings))
         if preflight.noisy:
             other = replace(settings, seed=settings.seed + 1)
             jobs += _picture(case, Job(renderer, SECOND_IMAGE, scene, other))
     for form in case.forms:
         shown = scene_for(form.scene, capabilities)
-        for probe in case.loaded.model.probes:
+        for probe in case.asked_probes(renderer):
             made = _probe_scenes(
                 shown, probe, form, capabilities, preflight, case.compares_rays(probe)
             )
@@ -214,6 +228,22 @@ def _probe_scenes(
         for axis in AXES:
             coded = code_scene(scene, plane, axis, cells, probe.path, probe.total_reflection)
             yield code_role(probe, index, axis, form.name), coded, None
+
+
+def shown_to(
+    case: PreparedCase, probe_name: str | None, capabilities: Collection[Capability]
+) -> ResolvedScene:
+    """The scene that shows what a probe measures, to look at; without a probe the case's own."""
+    scene = scene_for(case.scene, capabilities)
+    if probe_name is None:
+        return scene
+    probe = case.probe(probe_name)
+    plane = case.planes(probe)[0]
+    if probe.measure == "all-light":
+        return all_light_scene(scene, plane)
+    if probe.measure == "light":
+        return light_scene(scene, plane, probe.path)
+    return ramp_scene(scene, plane, probe.path, probe.total_reflection)
 
 
 def auxiliary_jobs(

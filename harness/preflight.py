@@ -20,6 +20,7 @@ from harness.chart import (
     plane,
     ramp_scene,
     shifted,
+    srgb_encode,
     true_coordinates,
     true_ramp,
 )
@@ -35,7 +36,8 @@ WEAKEST = 0.3
 FINEST = 4095
 # The largest error of a radiance that an honest image can have: half a step of 8 bits where sRGB is
 # steepest, and a percent. A renderer that is further off is wrong, not coarse.
-COARSEST = 1.01 * 0.5 / 255 * 2.4 / 1.055
+SRGB_STEEPEST = 2.4 / 1.055
+COARSEST = 1.01 * 0.5 / 255 * SRGB_STEEPEST
 FLOAT32 = float(np.finfo(np.float32).eps)
 FLOAT64 = float(np.finfo(np.float64).eps)
 
@@ -81,7 +83,27 @@ class Preflight:
             "code_cells": self.cells,
             "position_resolution": self.position_error,
             "epsilon": self.epsilon,
+            "values": stored_as(self.quantum),
+            "noise": f"{self.samples} samples per pixel" if self.samples is not None else "none",
         }
+
+
+# Half a step of the formats that images are stored in, and twice that, where a value between 0 and
+# 1 is rounded worst: linear 8 and 16 bits, and half floats just below 1.
+FORMATS = {"16 bits": 0.5 / 65535, "half floats": 2.0**-12, "8 bits": 0.5 / 255}
+
+
+def stored_as(quantum: float) -> str:
+    """The format, in words, whose rounding is what a renderer's values are off by."""
+    if not np.isfinite(quantum):
+        return "unknown"
+    if quantum <= 8 * FLOAT32:
+        return "floats"
+    for name, step in FORMATS.items():
+        if step / 1.5 < quantum < 1.5 * step:
+            return name
+    # sRGB is steeper where it is dark, and flatter where it is bright.
+    return "8 bits, not linear" if quantum > FORMATS["8 bits"] / 4 else "of no known format"
 
 
 def preflight(
@@ -120,13 +142,27 @@ def _quantum(images: Mapping[str, Image]) -> float:
     """Largest error of a value of the chart.
 
     The largest of N errors spread evenly up to a bound falls short of it by 1/N of it; 1% covers
-    that for the chart's 36,864 values. A renderer of floats has at least their rounding.
+    that for the chart's 36,864 values. A renderer of floats has at least their rounding. The steps
+    of sRGB grow with the value, and the chart's brightest pixels are few: a picture whose values
+    are such steps has half of the last one, whatever the chart showed.
     """
     worst = max(
         float(np.abs(images[axis].pixels.astype(np.float64) - true_ramp(axis)).max())
         for axis in AXES
     )
-    return max(1.01 * worst, FLOAT32)
+    steps = _srgb_steps(images)
+    last = 0.5 / steps * SRGB_STEEPEST if steps else 0.0
+    return max(1.01 * worst, FLOAT32, last)
+
+
+def _srgb_steps(images: Mapping[str, Image]) -> int | None:
+    """255 or 65535 where all values are that many steps of sRGB, as files hold them."""
+    codes = srgb_encode(np.stack([images[axis].pixels.astype(np.float64) for axis in AXES]))
+    for steps in (255, 65535):
+        # Being kept in float32 moves a value of 0.1 or more by less than 0.01 steps.
+        if (np.abs(codes * steps - np.round(codes * steps)) < 0.02).all():
+            return steps
+    return None
 
 
 def _too_coarse(quantum: float) -> str:

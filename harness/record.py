@@ -60,6 +60,7 @@ class Check(Model):
     status: Verdict
     reason: str
     derivation: str = ""
+    cause: str = ""  # of a documented deviation, word for word as the scene has it
     detail: dict[str, float | int | str] = Field(default_factory=dict)
     stored: list[str] = Field(default_factory=list)  # renderers whose side was not rendered now
     baseline: AgainstBaseline | None = None

@@ -13,6 +13,9 @@ from harness.record import Check, Stored, Verdict
 from harness.renderers.base import Capability, Image, RayPaths
 from harness.scene.resolved import Mesh, ResolvedScene
 
+# How the reason of a renderer begins that is out because of its calibration.
+FAILED_PREFLIGHT = "failed its preflight: "
+
 Result = Image | RayPaths | RendererError
 
 

@@ -133,7 +133,9 @@ def _summary(
         renderers={name: _renderer_summary(session, name) for name in session.names},
         counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),
         cases=cases,
-        diagnoses=explain_run([state.case for state in session.states], cases, session.names),
+        diagnoses=explain_run(
+            [state.case for state in session.states], cases, {c.name: c.reason for c in contenders}
+        ),
         effort=session.effort.model_copy(update={"damaged": damaged}),
         interrupted=interrupted,
     )

@@ -73,6 +73,9 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
             console.print(f"[bold]{escape(name)}[/]: {escape(renderer.reason)}")
             if renderer.remedy:
                 console.print(f"  mend it with: [bold]{escape(renderer.remedy)}[/]")
+    for name, renderer in summary.renderers.items():
+        if renderer.facts:
+            console.print(f"{escape(name)}: {escape(_resolution(renderer.facts))}")
     _problems(summary, console)
     for diagnosis in summary.diagnoses:
         console.print(f"[bold]Diagnosis[/] {escape(diagnosis.sentence)}")
@@ -81,6 +84,15 @@ def verdicts(summary: Summary, index: Path, console: Console | None = None) -> N
     said = ", ".join(f"[{STYLE[v]}]{counts[v]} {v.value}[/]" for v in Verdict)
     console.print(f"{sum(counts.values())} checks in {summary.wall_s:.1f} s: {said}")
     console.print(f"Report: {escape(str(index))}", soft_wrap=True)
+
+
+def _resolution(facts: dict[str, float | int | str]) -> str:
+    """What preflight found the renderer able to show; all tolerances derive from it."""
+    said = [f"values to {float(facts['quantum']):.2g} ({facts.get('values', 'unknown')})"]
+    said.append(f"positions to {float(facts['position_resolution']):.2g} of a plane")
+    digits = "double" if float(facts["epsilon"]) < 1e-12 else "single"
+    said.append(f"{digits} precision, noise: {facts.get('noise', 'unknown')}")
+    return ", ".join(said)
 
 
 def _effort(summary: Summary, console: Console) -> None:

@@ -199,12 +199,14 @@ def natural_weight(form: ClosedForm, rays: Rays, path: str) -> Float:
 @dataclass(frozen=True)
 class AllLight:
     """What all paths bring together: `level` (m, 3) by a renderer's unpolarised Fresnel factors,
-    `natural` (m, 3) by nature's, and `cut` (m,) the weight of paths left out as too weak.
+    `natural` (m, 3) by nature's, and `cut` (m,) the weight of paths left out: too weak, too long.
+    `closest` (m,) is the shortest way between two interfaces on any of them.
     """
 
     level: Float
     natural: Float
     cut: Float
+    closest: Float
 
 
 def light_on(
@@ -223,7 +225,10 @@ def light_on(
     per_medium = (ior[form.scene.camera.medium] / ior) ** 2 if n2 else np.ones(len(ior))
     m = len(rays.origins)
     level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    closest = np.full(m, np.inf)
     for branch in branches(form, rays, depth, min_weight):
+        if branch.path:
+            closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         landing = form.meet(
             plane, branch.origin, branch.direction, branch.ahead, branch.medium, branch.absorbed
         )
@@ -234,17 +239,20 @@ def light_on(
         level[rows] += branch.weight[on, None] * left
         natural[rows] += branch.natural[on, None] * left
         followed[branch.rows[ends]] += branch.weight[ends]
-    return AllLight(level, natural, 1 - followed)
+    return AllLight(level, natural, 1 - followed, closest)
 
 
 def light_around(form: ClosedForm, rays: Rays, depth: int, min_weight: float) -> AllLight:
     """The same where everything around shines with radiance 1: a white furnace."""
     m = len(rays.origins)
     level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    closest = np.full(m, np.inf)
     for branch in branches(form, rays, depth, min_weight):
+        if branch.path:
+            closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         leaves = ~np.isfinite(branch.ahead)
         rows, left = branch.rows[leaves], np.exp(-branch.absorbed[leaves])
         level[rows] += branch.weight[leaves, None] * left
         natural[rows] += branch.natural[leaves, None] * left
         followed[rows] += branch.weight[leaves]
-    return AllLight(level, natural, 1 - followed)
+    return AllLight(level, natural, 1 - followed, closest)

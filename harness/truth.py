@@ -1,8 +1,9 @@
 """The truth of every measured ray: the closed forms of `harness.expected`, chained along a path.
 
-A path has a letter per interface, T for transmitted and R for reflected. Solids are convex and
-nested or apart, so each interface is one root of one line-solid intersection and nothing has to be
-searched or thresholded.
+A path has a letter per interface, T for transmitted and R for reflected. Where solids are nested or
+apart each interface is one root of one line-solid intersection, and nothing has to be searched or
+thresholded. Where they share faces or overlap, roots within rounding are one interface, and where
+a solid of higher priority is on both sides there is none.
 """
 
 from __future__ import annotations
@@ -17,7 +18,11 @@ from harness.expected import Float, reflect
 from harness.intervals import Chord
 from harness.law import PHYSICS, Interface, Law, Leg
 from harness.renderers.base import Rays, Status
+from harness.scene.containment import bounds
 from harness.scene.resolved import Mesh, Rectangle, ResolvedScene
+
+# Two roots for one face, each from a few roundings of the scene's coordinates.
+MEETING = 64 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,8 @@ class ClosedForm:
     def __init__(self, scene: ResolvedScene, law: Law = PHYSICS) -> None:
         self.scene, self.law = scene, law
         self._bodies = [Body(solid) for solid in scene.solids]
+        meeting = [np.abs(bounds(solid.shape)).max() for solid in scene.solids if solid.meets]
+        self._meeting, self._extent = bool(meeting), float(max(meeting, default=0.0))
         self._meshes = np.array([isinstance(s.shape, Mesh) for s in scene.solids] or [False])
 
     def follow(self, rays: Rays, path: str) -> TruePaths:
@@ -99,18 +106,26 @@ class ClosedForm:
         medium = np.full(m, scene.camera.medium, np.intp)
 
         for k, letter in enumerate(path):
-            if k:
-                chords = [body.chords(o, d) for body in bodies]
-            t, n, which = _next_interface(chords, inside)
+            at_once = None
+            if self._meeting:
+                t, n, which, at_once = self._visible_interface(o, d, inside)
+            else:
+                if k:
+                    chords = [body.chords(o, d) for body in bodies]
+                t, n, which = _next_interface(chords, inside)
             status[(status == Status.HIT) & ~np.isfinite(t)] = Status.MISS
             live = status == Status.HIT
             t = np.where(live, t, 0.0)
             o = o + t[:, None] * d
             start = normals[:, k - 1] if k else None
             absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
-            facing = law.normal(np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n))
+            facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
+            facing = law.normal(facing, self._meshes[which])
             leaving = inside[which, rows] if bodies else live
-            beyond = np.where(live, _beyond(bodies, which, leaving), 0)
+            if at_once is None:
+                beyond = np.where(live, _beyond(bodies, which, leaving), 0)
+            else:
+                beyond = np.where(live, self._filling(inside ^ at_once), 0)
             at = Interface(o, d, facing, ior[medium], ior[beyond], ~leaving, t, self._meshes[which])
             c, reflectance = at.cos_theta_i, law.reflectance(at)
             cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
@@ -126,9 +141,12 @@ class ClosedForm:
             weight *= np.where(live, law.transmittance(at, reflectance), 1.0)
             d = np.where(live[:, None], bent, d)
             o = law.start(at, d)
-            inside[which[live], np.flatnonzero(live)] ^= True
+            if at_once is None:
+                inside[which[live], np.flatnonzero(live)] ^= True
+            else:
+                inside ^= at_once & live
             medium = np.where(live, beyond, medium)
-        ahead, _, _ = _next_interface([body.chords(o, d) for body in bodies], inside)
+        ahead = self.next_interface(o, d, inside).t
         return TruePaths(
             status, o, d, medium, weight, absorbed, cos_i, eta, interface, normals, inside, ahead
         )
@@ -180,12 +198,55 @@ class ClosedForm:
 
     def next_interface(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Boundary:
         """The next boundary of rays from `o` along `d` that are in the solids `inside`."""
-        chords = [body.chords(o, d) for body in self._bodies]
-        t, n, which = _next_interface(chords, inside)
         rows = np.arange(len(o))
-        leaving = inside[which, rows] if self._bodies else np.zeros(len(o), bool)
+        if self._meeting:
+            inside = inside.copy()
+            t, n, which, at_once = self._visible_interface(o, d, inside)
+            beyond = self._filling(inside ^ at_once)
+        else:
+            t, n, which = _next_interface([body.chords(o, d) for body in self._bodies], inside)
+            leaving = inside[which, rows] if self._bodies else np.zeros(len(o), bool)
+            beyond = _beyond(self._bodies, which, leaving)
         facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
-        return Boundary(t, facing, which, _beyond(self._bodies, which, leaving))
+        return Boundary(t, facing, which, beyond)
+
+    def _visible_interface(
+        self, o: Float, d: Float, inside: NDArray[np.bool_]
+    ) -> tuple[Float, Float, NDArray[np.intp], NDArray[np.bool_]]:
+        """(distance, outward normal, solid, solids (solids, m) that are crossed together there).
+
+        Flips in `inside` whatever boundaries are passed on the way that are hidden.
+        """
+        rounding = MEETING * self._extent
+        way, pending = np.zeros(len(o)), np.ones(len(o), bool)
+        normal, solid = np.zeros((len(o), 3)), np.zeros(len(o), np.intp)
+        at_once = np.zeros_like(inside)
+        for _ in range(2 * len(self._bodies) + 1):
+            place = o + np.where(np.isfinite(way), way, 0.0)[:, None] * d
+            chords = [body.chords(place, d) for body in self._bodies]
+            t, n, which = _next_interface(chords, inside)
+            alone = [_next_interface([c], i[None])[0] for c, i in zip(chords, inside, strict=True)]
+            with np.errstate(invalid="ignore"):
+                crossed = np.isfinite(t) & (np.abs(np.array(alone) - t) <= rounding)
+            hidden = self._topmost(inside) == self._topmost(inside ^ crossed)
+            way = np.where(pending, way + t, way)
+            normal, solid = np.where(pending[:, None], n, normal), np.where(pending, which, solid)
+            at_once = np.where(pending, crossed, at_once)
+            pending &= hidden & np.isfinite(t)
+            inside ^= crossed & pending
+            if not pending.any():
+                break
+        return way, normal, solid, at_once
+
+    def _topmost(self, inside: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """The solid that fills where all of `inside` (solids, m) are; -1 outside of all."""
+        order = np.argsort([-body.solid.priority for body in self._bodies], kind="stable")
+        return np.where(inside.any(axis=0), order[inside[order].argmax(axis=0)], -1)
+
+    def _filling(self, inside: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """The medium there."""
+        media = np.array([*(body.solid.medium for body in self._bodies), 0])
+        return np.asarray(media[self._topmost(inside)])
 
 
 def _enclosing(chords: list[list[Chord]], m: int) -> NDArray[np.bool_]:

@@ -37,6 +37,7 @@ def judge(spec: CheckSpec, renderer: str, against: str, comparison: Comparison) 
     return Check(
         id=check_id(spec, renderer, against), renderer=renderer, against=against,
         observable=spec.observable, value=comparison.value, expected=comparison.expected,
+        cause=known.cause if known else "",
         tolerance=tolerance, unit=unit, status=status, reason=reason, derivation=derivation,
         detail=comparison.detail,
     )  # fmt: skip

@@ -144,7 +144,7 @@ def imported_modules(source: str) -> set[str]:
 
 def test_the_entry_points_are_those_that_third_parties_use() -> None:
     registered = project()["project"]["entry-points"]["snellcheck.renderers"]
-    assert set(registered) == {"tracer", "povray", "mitsuba", "mitsuba-exact"}
+    assert set(registered) == {"tracer", "povray", "povray-stock", "mitsuba", "mitsuba-exact"}
 
 
 # --- what must never be in it ---------------------------------------------------------------------

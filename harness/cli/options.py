@@ -71,10 +71,23 @@ def prepared_cases(
 def chosen_renderers(
     names: Sequence[str], commands: Sequence[str], configs: Sequence[Path]
 ) -> list[Renderer]:
-    """Those named; without names the built-in ones, and in any case the user's own."""
+    """Those named; without names the registered ones, and in any case the user's own.
+
+    Renderers that only some scenes are about are left to `named_by`.
+    """
     from harness.renderers import registry
 
     own = [registry.command_renderer(template) for template in commands]
     own += [registry.configured_renderer(path) for path in configs]
-    chosen = list(names) or sorted(registry.available())
+    chosen = list(names) or sorted(registry.available().keys() - registry.ONLY_WHERE_NAMED)
     return [*(registry.create(name) for name in chosen), *own]
+
+
+def named_by(cases: Sequence[PreparedCase]) -> list[Renderer]:
+    """The renderers that are asked only where a check names them, where one of `cases` does."""
+    from harness.renderers import registry
+
+    checks = (check for case in cases for check in case.loaded.model.checks)
+    named = {name for check in checks for name in check.renderers}
+    available = registry.ONLY_WHERE_NAMED & named & registry.available().keys()
+    return [registry.create(name) for name in sorted(available)]

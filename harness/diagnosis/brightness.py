@@ -106,6 +106,17 @@ def _fresnel_index(world: World, a: Values) -> World:
     return _of_other_index(world, wrong)
 
 
+def _fresnel_fixed(world: World, a: Values) -> World:
+    def wrong(at: Interface) -> Interface:
+        return replace(
+            at,
+            ior_i=np.where(at.entering, at.ior_i, a[0]),
+            ior_t=np.where(at.entering, a[0], at.ior_t),
+        )
+
+    return _of_other_index(world, wrong)
+
+
 def _says_fresnel_index(fit: Fitted) -> str:
     if len(fit.iors) == 1:
         n = fit.iors[0]
@@ -287,7 +298,12 @@ BRIGHTNESS = (
     ),
     Hypothesis(
         "fresnel-index", _fresnel_index, _says_fresnel_index,
-        ((-0.267,), (0.05,), (-0.05,)), "relative error",
+        ((-0.267,), (0.05,), (-0.05,)), "relative error", kin="fresnel-index",
+    ),
+    Hypothesis(
+        "fresnel-fixed", _fresnel_fixed,
+        lambda f: f"weighs light by the Fresnel factors of n = {f}, whatever the scene says",
+        ((1.1,), (1.5,)), "n", kin="fresnel-index",
     ),
     Hypothesis(
         "rs-denominator", _half_denominator,
@@ -334,8 +350,8 @@ BRIGHTNESS = (
     Hypothesis("radiance-n2", _n2, _says_n2, ((1.0,), (-1.0,), (0.05,)), "excess power / 2"),
     Hypothesis(
         "recursion-depth", _depth_cap,
-        lambda f: f"stops after {f.values[0]:.0f} surfaces: its recursion is too shallow",
-        tuple((float(k),) for k in range(12)), "surfaces", continuous=False,
+        lambda f: f"stops after {f.values[0]:.0f} surfaces at most: its recursion is too shallow",
+        tuple((float(k),) for k in range(11, -1, -1)), "surfaces", continuous=False,
     ),
     Hypothesis(
         "nan-at-normal", _nan_at_normal,

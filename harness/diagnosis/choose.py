@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from harness.diagnosis.evidence import Evidence
-from harness.diagnosis.fit import Fit, fit, truth_fit
+from harness.diagnosis.fit import TRIMMED, Fit, fit, truth_fit
 from harness.diagnosis.hypothesis import Fitted, Hypothesis
 from harness.diagnosis.library import LIBRARY
 from harness.record import Cause, CauseFit, Diagnosis
 
-# A cause fits where it leaves no more than twice the tolerance, or 3% of the deviation.
+# A cause fits where it leaves no more than twice the tolerance, or a thousandth of the deviation.
 WITHIN = 2.0
-LEFT = 0.03
+LEFT = 0.001
 # What being further down in the library costs: no more than enough to decide between equals.
 ORDER = 0.01
 # Two causes explain a case equally well where their costs differ by less.
 SAME = 2.0
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -35,27 +38,35 @@ def complexity(hypothesis: Hypothesis, rays: int) -> float:
     return hypothesis.size / 2 * float(np.log(max(rays, 2))) + ORDER * LIBRARY.index(hypothesis)
 
 
-def rank(evidence: Sequence[Evidence]) -> list[Ranked]:
+def rank(evidence: Sequence[Evidence], trimmed: float) -> list[Ranked]:
     """All hypotheses that say something about the evidence, the best first."""
     ranked = []
     for hypothesis in LIBRARY:
-        found = fit(hypothesis, evidence)
+        found = fit(hypothesis, evidence, trimmed)
         if found is not None:
             cost = found.score + complexity(hypothesis, sum(found.rays))
             cost += min(hypothesis.prior(piece.setting) for piece in evidence)
             ranked.append(Ranked(found, cost))
-    return sorted(ranked, key=lambda r: r.cost)
+    ranked.sort(key=lambda r: r.cost)
+    return first_of_kin(ranked, lambda r: r.cost, lambda r: r.fit.hypothesis)
 
 
 def diagnose(renderer: str, evidence: Sequence[Evidence]) -> Diagnosis | None:
     """The diagnosis of one case; None where the evidence shows no deviation."""
-    truth = truth_fit(evidence)
-    if not evidence or max(truth.squares) <= 1:
+    if not evidence:
         return None
-    ranked = rank(evidence)
+    truth, trimmed = truth_fit(evidence), TRIMMED
+    if max(truth.squares) <= 1:  # then only a few rays are off, if any
+        truth, trimmed = truth_fit(evidence, 0.0), 0.0
+    if max(truth.squares) <= 1:
+        return None
+    ranked = rank(evidence, trimmed)
     deviation = float(np.sqrt(np.average(truth.squares, weights=truth.rays)))
     iors = indices(evidence)
-    best, second = ranked[0], next(r for r in ranked if not akin(r, ranked[0]))
+    best, second = (
+        ranked[0],
+        next(r for r in ranked if not akin(r.fit.hypothesis, ranked[0].fit.hypothesis)),
+    )
     nearest, next_best = (cause_of(r.fit, deviation, iors) for r in (best, second))
     if truth.score - best.cost > SAME and fits(best.fit.squares, truth.squares):
         sentence, cause, runner_up = f"{renderer} {nearest.sentence}", nearest, next_best
@@ -79,10 +90,21 @@ def diagnose(renderer: str, evidence: Sequence[Evidence]) -> Diagnosis | None:
     )  # fmt: skip
 
 
-def akin(a: Ranked, b: Ranked) -> bool:
+def first_of_kin(
+    ranked: list[T], cost: Callable[[T], float], hypothesis: Callable[[T], Hypothesis]
+) -> list[T]:
+    """The same, led by the likeliest of the best one's kin that are as good."""
+    best = ranked[0]
+    equals = [
+        r for r in ranked if akin(hypothesis(r), hypothesis(best)) and cost(r) - cost(best) < SAME
+    ]
+    leader = min(equals, key=lambda r: LIBRARY.index(hypothesis(r)))
+    return [leader, *(r for r in ranked if r is not leader)]
+
+
+def akin(a: Hypothesis, b: Hypothesis) -> bool:
     """Whether two hypotheses say the same of a single case."""
-    mine, other = a.fit.hypothesis, b.fit.hypothesis
-    return mine is other or (mine.kin != "" and mine.kin == other.kin)
+    return a is b or (a.kin != "" and a.kin == b.kin)
 
 
 def no_cause(renderer: str, nearest: Cause) -> str:

@@ -72,16 +72,15 @@ def landings(
     truth: ProbeTruth, rays: RayMeasurement, precision: Precision, thin: bool
 ) -> Landings | None:
     """None where no ray says anything."""
-    point_tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
-    direction_tolerance = rays.direction_uncertainty + truth.direction_tolerance(precision)
+    point_tolerance = _usual(rays.point_uncertainty) + truth.point_tolerance(precision)
+    direction_tolerance = _usual(rays.direction_uncertainty) + truth.direction_tolerance(precision)
     usable = ~truth.grazing & ~rays.undecided & ~rays.faint & ~rays.mixed & _known(truth)
     error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1) / point_tolerance
     if rays.direction is not None:
         turned = np.linalg.norm(rays.direction - truth.paths.direction, axis=1)
         error = np.fmax(error, turned / direction_tolerance)
-    rows = _chosen(truth, usable, np.nan_to_num(error, nan=-1.0))
-    # What a wrong renderer measures may be less exact than truth would be there: what is not a
-    # number says nothing.
+    lost = usable & ~rays.seen & (truth.paths.status == Status.HIT)
+    rows = _chosen(truth, usable, np.where(lost, np.inf, np.nan_to_num(error, nan=-1.0)))
     exact = np.isfinite(point_tolerance[rows]) & np.isfinite(direction_tolerance[rows])
     rows = rows[exact]
     if not len(rows):
@@ -94,6 +93,13 @@ def landings(
         point_tolerance[rows],
         direction_tolerance[rows],
     )
+
+
+def _usual(uncertainty: Float) -> Float:
+    """The uncertainties, and for rays that are not seen the usual one of those that are."""
+    known = uncertainty[np.isfinite(uncertainty)]
+    usual = float(np.median(known)) if len(known) else 1e-7
+    return np.asarray(np.where(np.isfinite(uncertainty), uncertainty, usual))
 
 
 def levels(

@@ -21,10 +21,10 @@ from harness.expected import Float
 
 # Rays that a wrong renderer's own edges may have spoilt: those of the truth are left out already.
 TRIMMED = 0.05
-MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 12, 5, 2
-# Steps of the right hypothesis gain most of what is left; one that gains less than this share of
-# its cost by a step is not the one.
-CRAWL = 0.02
+MOST_STEPS, MOST_HALVINGS, STARTS_TRIED = 16, 5, 2
+# A step that gains less than this in cost, a factor of 1.6 in likelihood, is the last.
+CRAWL = 0.5
+FARTHEST = 1e4  # no parameter is larger
 LARGEST = 1e15  # of a misfit, so that squares stay finite
 
 
@@ -65,12 +65,14 @@ class _Point:
 At = Callable[[Values], _Point]
 
 
-def _point(worlds: Sequence[World], evidence: Sequence[Evidence]) -> _Point:
+def _point(
+    worlds: Sequence[World], evidence: Sequence[Evidence], trimmed: float = TRIMMED
+) -> _Point:
     gaps, squares, rays = [], [], []
     for world, piece in zip(worlds, evidence, strict=True):
         gap = np.clip(np.nan_to_num(misfit(world, piece), nan=LARGEST), -LARGEST, LARGEST)
         each = np.sort((gap**2).mean(axis=1))
-        kept = max(1, int(np.ceil(len(each) * (1 - TRIMMED))))
+        kept = max(1, int(np.ceil(len(each) * (1 - trimmed))))
         gaps.append(gap)
         squares.append(float(each[:kept].mean()))
         rays.append(len(each))
@@ -83,15 +85,18 @@ def cost_of(worlds: Sequence[World], evidence: Sequence[Evidence]) -> float:
     return _point(worlds, evidence).score
 
 
-def truth_fit(evidence: Sequence[Evidence]) -> _Point:
+def truth_fit(evidence: Sequence[Evidence], trimmed: float = TRIMMED) -> _Point:
     """How well the right world explains the evidence."""
-    return _point([World.right(piece.setting) for piece in evidence], evidence)
+    return _point([World.right(piece.setting) for piece in evidence], evidence, trimmed)
 
 
-def fit(hypothesis: Hypothesis, evidence: Sequence[Evidence]) -> Fit | None:
+def fit(
+    hypothesis: Hypothesis, evidence: Sequence[Evidence], trimmed: float = TRIMMED
+) -> Fit | None:
     """The best parameters by Gauss and Newton from the most promising starts.
 
-    None where the hypothesis says nothing about any of the evidence.
+    `trimmed` is the share of rays that may be anything. None where the hypothesis says nothing
+    about any of the evidence.
     """
     right = [World.right(piece.setting) for piece in evidence]
     concerned = [hypothesis.applies(world) for world in right]
@@ -99,11 +104,12 @@ def fit(hypothesis: Hypothesis, evidence: Sequence[Evidence]) -> Fit | None:
         return None
 
     def at(values: Values) -> _Point:
-        worlds = [
-            hypothesis.world(world, values) if mine else world
-            for world, mine in zip(right, concerned, strict=True)
-        ]
-        return _point(worlds, evidence)
+        with np.errstate(all="ignore"):  # what is no number is no fit
+            worlds = [
+                hypothesis.world(world, values) if mine else world
+                for world, mine in zip(right, concerned, strict=True)
+            ]
+        return _point(worlds, evidence, trimmed)
 
     tried = sorted(((at(start), start) for start in hypothesis.starts), key=lambda t: t[0].score)
     if not hypothesis.size or not hypothesis.continuous:
@@ -131,7 +137,9 @@ def _descend(at: At, point: _Point, values: Values) -> tuple[_Point, Values, Flo
             break
         better = None
         for halving in range(MOST_HALVINGS):
-            there = tuple(np.array(values) + step / 2**halving)
+            there = tuple(float(v) for v in np.array(values) + step / 2**halving)
+            if max(map(abs, there)) > FARTHEST:
+                continue
             other = at(there)
             if other.score < point.score:
                 better = (other, there)
@@ -140,7 +148,7 @@ def _descend(at: At, point: _Point, values: Values) -> tuple[_Point, Values, Flo
             break
         gained = point.score - better[0].score
         point, values = better
-        if gained < max(1e-3, CRAWL * point.score):
+        if gained < CRAWL:
             break
     return point, values, curvature
 

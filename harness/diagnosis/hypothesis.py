@@ -38,9 +38,10 @@ class Hypothesis:
     """One known cause of wrong pictures.
 
     `world` exchanges one thing of a world, given the parameters. `starts` are parameters from which
-    a fit begins; where they are not `continuous` they are all that can be. A hypothesis without
-    parameters has the one start (). `says` is the second half of the sentence "The renderer …".
-    `parameter` and `unit` name the first parameter. `prior` lowers the cost where it is likelier.
+    a fit begins; where they are not `continuous` they are all that can be, the most harmless first.
+    A hypothesis without parameters has the one start (). `says` is the second half of the sentence
+    "The renderer …". `parameter` and `unit` name the first parameter. `prior` lowers the cost where
+    it is likelier.
     Hypotheses of one `kin` say the same of a single case and differ over several.
     """
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.diagnosis.edges import nearness
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, percent, plus_minus, says
 from harness.diagnosis.worlds import World
 from harness.expected import Float, lecture_table_angle, refract
@@ -99,7 +100,7 @@ def _power(world: World, a: Values) -> World:
         eta = (at.ior_i / at.ior_t) ** (1 - 2 * a[0])
         return refract(at.direction, at.n, eta, np.ones_like(eta))
 
-    return world.with_law(bend=bend)
+    return _bent_by(world, bend)
 
 
 def _unsquared(world: World, a: Values) -> World:
@@ -107,7 +108,7 @@ def _unsquared(world: World, a: Values) -> World:
         eta = at.ior_i / at.ior_t
         return _along(at, eta, 1 - eta ** (2 - a[0]) * _sin2(at))
 
-    return world.with_law(bend=bend)
+    return _bent_by(world, bend)
 
 
 def _by_angle(at: Interface, theta_t: Float) -> tuple[Float, Mask]:
@@ -120,13 +121,13 @@ def _by_angle(at: Interface, theta_t: Float) -> tuple[Float, Mask]:
     return bent, total
 
 
-def _linear(at: Interface) -> tuple[Float, Mask]:
-    return _by_angle(at, np.arccos(at.cos_theta_i) * at.ior_i / at.ior_t)
+def _linear(at: Interface) -> Float:
+    return _by_angle(at, np.arccos(at.cos_theta_i) * at.ior_i / at.ior_t)[0]
 
 
-def _literal_table(at: Interface) -> tuple[Float, Mask]:
+def _table(at: Interface) -> Float:
     """The lecture's printed table for every surface, whatever the indices."""
-    return _by_angle(at, lecture_table_angle(np.arccos(at.cos_theta_i)))
+    return _by_angle(at, lecture_table_angle(np.arccos(at.cos_theta_i)))[0]
 
 
 def _degrees(at: Interface) -> tuple[Float, Mask]:
@@ -176,7 +177,7 @@ def _not_unit(world: World, a: Values) -> World:
         bent = eta * d + (eta * c - np.sqrt(np.maximum(square, 0))) * at.n
         return bent / np.linalg.norm(bent, axis=1, keepdims=True), square[:, 0] <= 0
 
-    return world.with_law(bend=bend)
+    return _bent_by(world, bend)
 
 
 def _leaks(at: Interface) -> tuple[Float, Mask]:
@@ -197,8 +198,8 @@ def _stretched_normals(axis: int) -> Hypothesis:
         stretch = np.ones(3)
         stretch[axis] = a[0]
 
-        def normal(n: Float) -> Float:
-            wrong = n * stretch
+        def normal(n: Float, on_mesh: Mask) -> Float:
+            wrong = np.where(on_mesh[:, None], n * stretch, n)
             return np.asarray(wrong / np.linalg.norm(wrong, axis=1, keepdims=True))
 
         return world.with_law(normal=normal)
@@ -206,12 +207,17 @@ def _stretched_normals(axis: int) -> Hypothesis:
     def text(fit: Fitted) -> str:
         scale = np.sqrt(max(fit.values[0], 0))
         return (
-            f"transforms normals as if they were points, by a matrix that stretches {'xyz'[axis]} "
-            f"{scale:.4g} times, instead of by its inverse transpose"
+            "transforms a mesh's normals as if they were points, by a matrix that stretches "
+            f"{'xyz'[axis]} {scale:.4g} times, instead of by its inverse transpose"
         )
 
     return Hypothesis(
-        f"normals-stretched-{'xyz'[axis]}", world, text, ((2.0,), (0.5,), (1.05,)), "stretch²"
+        f"normals-stretched-{'xyz'[axis]}",
+        world,
+        text,
+        ((2.0,), (0.5,), (1.05,)),
+        "stretch²",
+        applies=_has_mesh,
     )
 
 
@@ -220,6 +226,15 @@ def _inside_out(at: Interface) -> tuple[Float, Mask]:
     wrong, wrongly = _inverted(at)
     on = at.on_mesh
     return np.where(on[:, None], wrong, bent), np.where(on, wrongly, total)
+
+
+def _leaking_mesh(world: World, a: Values) -> World:
+    """What becomes of rays within a[0] (barycentric) of a triangle's edge is open."""
+
+    def lost(paths: TruePaths) -> Mask:
+        return np.asarray((nearness(world.scene, paths.interface) < a[0]).any(axis=1))
+
+    return replace(world, lost=lost)
 
 
 def _has_mesh(world: World) -> bool:
@@ -258,10 +273,32 @@ def _says_offset(fit: Fitted) -> str:
     return f"offsets the ray {fit} times as far as it should"
 
 
+def _bent_by(world: World, bend: Bend) -> World:
+    """Refraction by `bend`; where that finds no direction, all light is reflected."""
+    law = world.law
+    return world.with_law(
+        bend=bend, reflectance=lambda at: np.where(bend(at)[1], 1.0, law.reflectance(at))
+    )
+
+
 def _lawless(
     name: str, bend: Bend, text: str, applies: Callable[[World], bool] = lambda _: True
 ) -> Hypothesis:
-    return Hypothesis(name, lambda w, _: w.with_law(bend=bend), says(text), applies=applies)
+    return Hypothesis(name, lambda w, _: _bent_by(w, bend), says(text), applies=applies)
+
+
+def _lawless_pair(
+    name: str, direction: Callable[[Interface], Float], text: str
+) -> tuple[Hypothesis, Hypothesis]:
+    """A wrong direction that always exists, and the same where reflection is not total."""
+    return (
+        _lawless(name, lambda at: (direction(at), np.zeros(len(at.leg), bool)), text),
+        _lawless(
+            f"{name}-but-total",
+            lambda at: (direction(at), snell(at)[1]),
+            f"{text}, but where all light is reflected",
+        ),
+    )
 
 
 REFRACTION = (
@@ -270,13 +307,9 @@ REFRACTION = (
         kin="index",
     ),
     _lawless("ratio-inverted", _inverted, "uses the ratio of indices upside down"),
-    _lawless(
-        "straight-on",
-        lambda at: _straight_where(at, np.ones(len(at.leg), bool)),
-        "does not refract at all: rays go straight on",
-    ),
-    _lawless("linear", _linear, "takes θt = θi n1/n2, as if all angles were small"),
-    _lawless("table", _literal_table, "takes θt = 2/3 θi, as in the lecture's printed table"),
+    *_lawless_pair("straight-on", lambda at: at.direction, "does not refract at all"),
+    *_lawless_pair("linear", _linear, "takes θt = θi n1/n2, as if all angles were small"),
+    *_lawless_pair("table", _table, "takes θt = 2/3 θi, as in the lecture's printed table"),
     _lawless("degrees", _degrees, "gives degrees to a sine that wants radians"),
     _lawless(
         "tangent-reversed", _reversed_tangent,
@@ -293,12 +326,19 @@ REFRACTION = (
         "refracts on the way out only",
     ),
     _lawless("mesh-inside-out", _inside_out, "takes triangle meshes inside out", _has_mesh),
+    Hypothesis(
+        "mesh-leaks", _leaking_mesh,
+        says("loses rays at the edges of triangles: its meshes are not watertight"),
+        tuple((m * 10.0**k,) for k in range(-8, -1) for m in (1, 3)), "barycentric distance",
+        continuous=False, applies=_has_mesh,
+    ),
     _lawless("tir-leaks", _leaks, "lets light out where all of it should be reflected"),
     _lawless(
         "tir-clamped", _grazes, "clamps the root: totally reflected rays graze the surface"
     ),
     Hypothesis(
         "offset", _offset, _says_offset, ((0.0,), (2.0,), (0.9,)), "offset factor",
+        applies=lambda world: world.setting.thin,
         prior=lambda setting: -5.0 if setting.thin else 0.0,
     ),
     Hypothesis(
@@ -310,6 +350,7 @@ REFRACTION = (
     Hypothesis(
         "unsquared", _unsquared,
         lambda f: "does not square the ratio of indices under the root" if f.near(1)
+        else "applies the ratio of indices to tangents instead of sines" if f.near(2)
         else f"raises the ratio under the root to {2 - f.values[0]:.4g} instead of squaring it",
         ((1.0,), (0.1,)), "missing power",
     ),

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.diagnosis.choose import SAME, complexity, no_cause
+from harness.diagnosis.choose import SAME, akin, complexity, first_of_kin, no_cause
 from harness.diagnosis.evidence import Evidence
 from harness.diagnosis.fit import cost_of
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
@@ -26,6 +26,8 @@ LOST = 0.1
 # Hypotheses that are held against witnesses: the others are out of the question.
 CANDIDATES = 8
 MOST_CAUSES = 3
+# A cause that explains fewer of the cases that are off is taken for a coincidence.
+CONVINCING = 1 / 3
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def diagnose_run(
     while left and len(found) < MOST_CAUSES:
         ranked = _ranked(left, witnesses)
         best = ranked[0]
-        if not best.explained:
+        if len(best.explained) < CONVINCING * len(left):
             break
         found.append(_as_diagnosis(renderer, left, ranked))
         left = {case: d for case, d in left.items() if case not in best.explained}
@@ -70,7 +72,8 @@ def diagnose_run(
 def _ranked(left: Mapping[str, Diagnosis], witnesses: Sequence[Witness]) -> list[_Common]:
     common = sorted((_common(h, left) for h in LIBRARY), key=lambda c: c.total)
     held = [_held_against(c, witnesses) for c in common[:CANDIDATES]]
-    return sorted(held, key=lambda c: c.total)
+    held.sort(key=lambda c: c.total)
+    return first_of_kin(held, lambda c: c.total, lambda c: c.hypothesis)
 
 
 def _fit_of(diagnosis: Diagnosis, name: str) -> CauseFit:
@@ -89,7 +92,8 @@ def _common(hypothesis: Hypothesis, left: Mapping[str, Diagnosis]) -> _Common:
         moved = fit.values[0] - values[0] if fit.values and values else 0.0
         lost = n / 2 * np.log1p(fit.information * moved**2 / n)
         if fit.values and not hypothesis.continuous:
-            lost = 0.0 if moved == 0 else truth
+            steps = [start[0] for start in hypothesis.starts]
+            lost = 0.0 if steps.index(fit.values[0]) <= steps.index(values[0]) else truth
         costs[case] = min(fit.score + lost, truth)
         if fit.id and fit.fits and lost <= SAME + LOST * (truth - fit.score):
             explained.append(case)
@@ -101,19 +105,20 @@ def _common(hypothesis: Hypothesis, left: Mapping[str, Diagnosis]) -> _Common:
 def _joint(hypothesis: Hypothesis, fits: Sequence[CauseFit]) -> tuple[Values, float]:
     """The mean of the cases' parameters, weighted by how sharply each knows its own.
 
-    Of parameters that come in steps the one that most cases have. The error is two standard errors,
+    Of parameters that come in steps the most harmful: each case has the most harmless one that
+    explains it. The error is two standard errors,
     or the cases' own scatter where that is larger.
     """
     if not hypothesis.size or not fits:
         return hypothesis.starts[0], 0.0
-    first = np.array([fit.values[0] for fit in fits])
+    first = [fit.values[0] for fit in fits]
     if not hypothesis.continuous:
-        best = max(set(first), key=lambda v: (int((first == v).sum()), v))
-        return (float(best),), 0.0
+        steps = [start[0] for start in hypothesis.starts]
+        return (max(first, key=steps.index),), 0.0
     weights = np.array([max(fit.information, 1e-300) for fit in fits])
     rest = max(fits, key=lambda f: f.information).values[1:]
     mean = float(np.average(first, weights=weights))
-    spread = np.sqrt(np.average((first - mean) ** 2, weights=weights) / len(fits))
+    spread = np.sqrt(np.average((np.array(first) - mean) ** 2, weights=weights) / len(fits))
     return (mean, *rest), 2 * float(max(weights.sum() ** -0.5, spread))
 
 
@@ -141,7 +146,7 @@ def _as_diagnosis(
     best = ranked[0]
     mine = {case: left[case] for case in best.explained}
     iors = tuple(sorted({n for d in mine.values() for n in d.iors}))
-    cause, second = _cause(best, mine, iors), next(c for c in ranked if not _akin(c, best))
+    cause, second = _cause(best, mine, iors), _next(ranked)
     other = [case for case in left if case not in best.explained]
     sentence = f"{renderer} {cause.sentence}"
     if len(left) > 1:
@@ -155,8 +160,10 @@ def _as_diagnosis(
     )  # fmt: skip
 
 
-def _akin(a: _Common, b: _Common) -> bool:
-    return a.hypothesis is b.hypothesis
+def _next(ranked: Sequence[_Common]) -> _Common:
+    """The runner-up: the next one that says something else."""
+    best = ranked[0].hypothesis
+    return next((c for c in ranked[1:] if not akin(c.hypothesis, best)), ranked[1])
 
 
 def _deviation(cases: Mapping[str, Diagnosis]) -> float:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting
 from harness.expected import Float
@@ -22,7 +23,8 @@ from harness.truth import ClosedForm, TruePaths
 class World:
     """`finish` changes the rays that leave the glass, `shown` the light that they bring.
 
-    `n2` is the power of (ior at the camera / ior at the light) that scales radiance.
+    `n2` is the power of (ior at the camera / ior at the light) that scales radiance. `lost` tells
+    of which rays (m,) the world cannot say what becomes of them.
     """
 
     setting: Setting
@@ -32,6 +34,7 @@ class World:
     finish: Callable[[Rays, TruePaths], TruePaths] = lambda _, paths: paths
     shown: Callable[[Float], Float] = lambda level: level
     n2: float = 0.0
+    lost: Callable[[TruePaths], NDArray[np.bool_]] | None = None
 
     @classmethod
     def right(cls, setting: Setting) -> World:
@@ -47,14 +50,16 @@ def misfit(world: World, evidence: Evidence) -> Float:
     """What the world predicts minus what was measured, in tolerances, for each ray (m, figures).
 
     A ray that lands where it should be dark, or the other way round, is as wrong as one that lands
-    a tenth of the plane aside.
+    a tenth of the plane aside. One of which the world says nothing is off by its tolerance.
     """
     form = ClosedForm(world.scene, world.law)
     with np.errstate(all="ignore"):
         paths = world.finish(world.rays, form.follow(world.rays, evidence.setting.path))
         if isinstance(evidence, Levels):
-            return _of_levels(world, form, paths, evidence)
-        return _of_landings(form, paths, evidence)
+            found = _of_levels(world, form, paths, evidence)
+        else:
+            found = _of_landings(form, paths, evidence)
+        return found if world.lost is None else np.where(world.lost(paths)[:, None], 1.0, found)
 
 
 def _of_levels(world: World, form: ClosedForm, paths: TruePaths, evidence: Levels) -> Float:

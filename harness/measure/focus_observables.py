@@ -28,7 +28,7 @@ from harness.measure.ray_parts import (
     usable,
 )
 from harness.measure.rays import RayMeasurement
-from harness.scene.resolved import Sphere
+from harness.scene.resolved import Lens, Sphere
 
 # A ray that leaves flatter than this, rad, crosses the axis too far away to say where.
 FLATTEST = 2e-3
@@ -42,7 +42,7 @@ class _Meridional:
     """Rays in terms of the axis: `height` (m,) of the incident ray; slope and crossing outside.
 
     `slope` is the tangent of the angle to the axis after the last interface, positive where the ray
-    comes down to it, `crossing` where it crosses, from the centre of the first solid;
+    comes down to it, `crossing` where it crosses, from the ball's centre or the lens's last vertex;
     `tolerance` (m,) of the crossing and `slope_tolerance` of the slope.
     """
 
@@ -65,7 +65,7 @@ def _meridional(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -
     axis, origin = np.array(camera.forward), np.array(camera.origin)
     start = truth.rays.origins - origin
     height = np.linalg.norm(start - (start @ axis)[:, None] * axis, axis=1)
-    middle = float((np.array(_ball(truth).center) - origin) @ axis) if _has_ball(truth) else 0.0
+    middle = float((_reference(truth) - origin) @ axis)
     slope, crossing, reach = _cross(rays.point - origin, direction, axis)
     true_slope, true_crossing, _ = _cross(
         truth.landings[0].point - origin, truth.paths.direction, axis
@@ -98,7 +98,7 @@ def _cross(point: Float, direction: Float, axis: Float) -> tuple[Float, Float, F
 
 
 def focus(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
-    """Where each ray crosses the axis, units from the centre of the ball, or from the camera.
+    """Where each ray crosses the axis, units from the ball's centre or the lens's last vertex.
 
     For a ball the truth is h / sin 2 (i - r); for other shapes, the chain of Snell's laws.
     """
@@ -131,10 +131,10 @@ def focal_length(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) 
 def back_focal_length(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """From the last vertex to the focus of rays near the axis, units."""
     seen = _meridional(truth, rays, precision)
-    closed = _closed_focal_length(truth) - _ball(truth).radius
-    radius = _ball(truth).radius
-    value, true = seen.crossing - radius, seen.true_crossing - radius
-    return _paraxial(seen, value, true, seen.tolerance, closed)
+    shape = truth.scene.solids[0].shape
+    past = shape.radius if isinstance(shape, Sphere) else 0.0
+    value, true = seen.crossing - past, seen.true_crossing - past
+    return _paraxial(seen, value, true, seen.tolerance, _closed_focus(truth) - past)
 
 
 def spherical_aberration(
@@ -142,25 +142,25 @@ def spherical_aberration(
 ) -> Comparison:
     """How far before the paraxial focus the highest ray crosses the axis, units; negative: before.
 
-    The truth is the closed form for that ray's height less the focal length.
+    For a ball the truth is the closed form for that ray's height less the focal length; for lenses
+    the ray's own chain of Snell's laws takes the place of the former.
     """
     seen = _meridional(truth, rays, precision)
-    if not _whole_ball(truth):
-        raise Unmeasurable("spherical aberration has a closed form for a ball here")
-    ior_i, ior_t = indices(truth)
-    near = _paraxial(
-        seen, seen.crossing, seen.true_crossing, seen.tolerance, _closed_focal_length(truth)
-    )
+    near = _paraxial(seen, seen.crossing, seen.true_crossing, seen.tolerance, _closed_focus(truth))
     top = int(np.argmax(np.where(seen.used, seen.height, -np.inf)))
-    radius = _ball(truth).radius
-    height = float(seen.height[top])
-    crossing = expected_systems.ball_crossing(np.asarray(height), radius, ior_t / ior_i)
-    value, true = float(seen.crossing[top]) - near.value, float(crossing) - near.expected
+    height, crossing = float(seen.height[top]), float(seen.true_crossing[top])
+    if _whole_ball(truth):
+        ior_i, ior_t = indices(truth)
+        ball = _ball(truth)
+        crossing = float(
+            expected_systems.ball_crossing(np.asarray(height), ball.radius, ior_t / ior_i)
+        )
+    value, true = float(seen.crossing[top]) - near.value, crossing - near.expected
     tolerance = float(seen.tolerance[top]) + near.tolerance
     return Comparison(
         value, true, tolerance, bool(abs(value - true) <= tolerance) and not seen.fault,
         "tolerance of the highest ray's crossing + that of the paraxial focus", seen.fault,
-        seen.detail | {"height": height, "relative_height": height / radius},
+        seen.detail | {"height": height},
     )  # fmt: skip
 
 
@@ -183,6 +183,38 @@ def aplanatic_image(truth: ProbeTruth, rays: RayMeasurement, precision: Precisio
         curve_of_rows(truth, seen.used, "Aplanatic image", "distance of the image (units)",
                       -seen.crossing, true, seen.tolerance),
     )  # fmt: skip
+
+
+def cartesian_focus(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
+    """Where rays of any height cross the axis behind a Cartesian surface: in one point.
+
+    By path T, inside the glass, behind an ellipsoid of conic constant -1 / n^2, from its vertex; by
+    path TT behind a flat face and a hyperboloid of -n^2, from its own.
+    """
+    seen = _meridional(truth, rays, precision)
+    shape = truth.scene.solids[0].shape
+    ior_i, ior_t = indices(truth)
+    n = ior_t / ior_i
+    if not isinstance(shape, Lens):
+        raise Unmeasurable("the first solid is no lens")
+    front, back = shape.radii
+    if truth.path == "T" and front and _near(shape.conics[0], -1 / n**2):
+        place = expected_systems.cartesian_ellipsoid_focus(front, n) - shape.thickness
+    elif truth.path == "TT" and front is None and back and _near(shape.conics[1], -(n**2)):
+        place = expected_systems.cartesian_hyperboloid_focus(-back, n)
+    else:
+        raise Unmeasurable("this lens has no Cartesian surface on this path")
+    true = np.full(len(seen.crossing), place)
+    return compare_rays(
+        truth, seen.crossing, true, seen.tolerance, seen.used, seen.fault, seen.detail,
+        derivation(rays, "tolerances of point and direction / sine of the angle to the axis"),
+        curve_of_rows(truth, seen.used, "Cartesian focus", "crosses the axis at (units)",
+                      seen.crossing, true, seen.tolerance),
+    )  # fmt: skip
+
+
+def _near(a: float, b: float) -> bool:
+    return abs(a - b) <= 1e-9 * abs(b)
 
 
 def rainbow_angle(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
@@ -229,16 +261,23 @@ def rainbow_angle(truth: ProbeTruth, rays: RayMeasurement, precision: Precision)
 # --- shared ---------------------------------------------------------------------------------------
 
 
-def _has_ball(truth: ProbeTruth) -> bool:
-    return isinstance(truth.scene.solids[0].shape, Sphere)
+def _reference(truth: ProbeTruth) -> Float:
+    """The point from which places on the axis are counted."""
+    shape = truth.scene.solids[0].shape
+    if isinstance(shape, Lens):
+        return np.array(shape.frame.origin) + shape.thickness * np.array(shape.frame.z)
+    return np.array(_ball(truth).center)
+
+
+def _alone(truth: ProbeTruth) -> bool:
+    """Whether one solid is seen by parallel rays from outside, so that closed forms hold."""
+    camera = truth.scene.camera
+    return len(truth.scene.solids) == 1 and camera.medium == 0 and camera.type == "orthographic"
 
 
 def _whole_ball(truth: ProbeTruth) -> bool:
     """Whether the scene is one ball, seen by parallel rays, so that its closed forms hold."""
-    return (
-        _has_ball(truth) and len(truth.scene.solids) == 1 and truth.scene.camera.medium == 0
-        and truth.scene.camera.type == "orthographic"
-    )  # fmt: skip
+    return isinstance(truth.scene.solids[0].shape, Sphere) and _alone(truth)
 
 
 def _ball(truth: ProbeTruth) -> Sphere:
@@ -249,10 +288,28 @@ def _ball(truth: ProbeTruth) -> Sphere:
 
 
 def _closed_focal_length(truth: ProbeTruth) -> float:
-    if not _whole_ball(truth):
-        raise Unmeasurable("the focal length of this shape has no closed form here")
     ior_i, ior_t = indices(truth)
-    return expected_systems.ball_focal_length(_ball(truth).radius, ior_t / ior_i)
+    shape, n = truth.scene.solids[0].shape, ior_t / ior_i
+    if isinstance(shape, Lens) and _alone(truth):
+        return 1 / expected_systems.lens_power(*_radii(shape), n, shape.thickness)
+    if _whole_ball(truth):
+        return expected_systems.ball_focal_length(_ball(truth).radius, n)
+    raise Unmeasurable("the focal length of this shape has no closed form here")
+
+
+def _closed_focus(truth: ProbeTruth) -> float:
+    """Of rays near the axis, from where `_reference` is."""
+    ior_i, ior_t = indices(truth)
+    shape = truth.scene.solids[0].shape
+    if isinstance(shape, Lens) and _alone(truth):
+        radii = _radii(shape)
+        return expected_systems.lens_back_focal_length(*radii, ior_t / ior_i, shape.thickness)
+    return _closed_focal_length(truth)
+
+
+def _radii(lens: Lens) -> tuple[float, float]:
+    front, back = (np.inf if radius is None else radius for radius in lens.radii)
+    return front, back
 
 
 def _paraxial(

@@ -65,6 +65,11 @@ class Observable(enum.StrEnum):
         "how far from the focus the outermost ray crosses the axis",
     )
     APLANATIC_IMAGE = "aplanatic_image", "units", "image distance of a sphere's aplanatic point"
+    CARTESIAN_FOCUS = (
+        "cartesian_focus",
+        "units",
+        "the one point where a Cartesian surface focuses rays of any height",
+    )
     RAINBOW_ANGLE = "rainbow_angle", "deg", "angle of a rainbow from the point opposite to the sun"
     OPTICAL_LENGTH = "optical_length", "units", "optical length of the path: sum of index x way"
     VARIANT_AGREEMENT = (

@@ -30,8 +30,6 @@ from harness.scene.resolved import (
     Surface,
     Translucent,
 )
-from harness.tree import light_around
-from harness.truth import ClosedForm
 
 
 def true_picture(scene: ResolvedScene) -> tuple[Float, Float]:
@@ -41,7 +39,7 @@ def true_picture(scene: ResolvedScene) -> tuple[Float, Float]:
     """
     rays = primary_rays(scene)
     if scene.solids:
-        return _furnace(scene, rays)
+        raise ValueError("a scene with solids and faces has no closed form of its picture")
     m = len(rays.origins)
     radiance, through = np.zeros((m, 3)), np.ones((m, 3))
     edge = np.full(m, np.inf)
@@ -59,18 +57,6 @@ def true_picture(scene: ResolvedScene) -> tuple[Float, Float]:
     radiance += through * np.array(scene.background)
     shape = (scene.film.height, scene.film.width)
     return radiance.reshape(*shape, 3), edge.reshape(shape)
-
-
-def _furnace(scene: ResolvedScene, rays: Rays) -> tuple[Float, Float]:
-    """Solids in a world that shines everywhere alike: what goes in comes out."""
-    if scene.surfaces or scene.lights:
-        raise ValueError("a scene with solids and faces has no closed form of its picture")
-    if any(any(medium.absorption) for medium in scene.media):
-        raise ValueError("a furnace with absorption has edges, which have no closed form here")
-    transport, shape = scene.transport, (scene.film.height, scene.film.width)
-    around = light_around(ClosedForm(scene), rays, transport.max_depth, transport.min_weight)
-    radiance = around.level * np.array(scene.background)
-    return radiance.reshape(*shape, 3), np.full(shape, np.inf)
 
 
 def _rectangle(surface: Surface) -> Rectangle:
@@ -175,19 +161,15 @@ def against_truth(
         return binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise_level)
     keep = edge > stray
     error = np.abs(picture.astype(np.float64) - true).max(axis=-1)
-    segments, cut = len(scene.surfaces) + 1, 0.0
-    if scene.solids:
-        segments = scene.transport.max_depth
-        # Paths whose weight is the least to be followed are followed by one and not by the other.
-        cut = 2 * scene.transport.min_weight * segments
-    rounding = ROUNDINGS * segments * precision.arithmetic / 2
-    tolerance = quantum + (cut + rounding) * float(true.max())
+    tolerance = quantum + ROUNDINGS * (len(scene.surfaces) + 1) * precision.arithmetic / 2 * float(
+        true.max()
+    )
     y, x = np.unravel_index(int(np.where(keep, error, -1).argmax()), error.shape)
     channel = int(np.abs(picture[y, x].astype(np.float64) - true[y, x]).argmax())
     return Comparison(
         float(picture[y, x, channel]), float(true[y, x, channel]), tolerance,
         bool(error[keep].max() <= tolerance),
-        "quantum of the image + 8 eps per surface + weights that may be cut",
+        "quantum of the image + 8 eps per surface",
         detail={"max": float(error[keep].max()), "rms": float(np.sqrt((error[keep] ** 2).mean())),
                 "excluded_grazing": int((~keep).sum()), "worst_pixel_x": int(x),
                 "worst_pixel_y": int(y)},

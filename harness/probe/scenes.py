@@ -12,6 +12,7 @@ from harness.scene.resolved import (
     Emissive,
     Mirror,
     PositionCode,
+    Ramp,
     Rectangle,
     ResolvedScene,
     Surface,
@@ -39,11 +40,24 @@ def code_scene(
     so paths of `total_reflection` do not need the partial one.
     """
     pattern = PositionCode.model_validate({"axis": axis, "cells": cells, "amplitude": AMPLITUDE})
-    transport = {
+    lobes = _lobes(path, total_reflection)
+    return _isolated(scene, plane, Emissive(pattern=pattern), path, lobes)
+
+
+def ramp_scene(
+    scene: ResolvedScene, plane: Rectangle, path: str, total_reflection: bool = False
+) -> ResolvedScene:
+    """The same for people, in a pattern that any renderer has: red is the coordinate along u."""
+    pattern = Ramp(start=(0.0, 0.0, 1.0), end=(1.0, 0.0, 1.0), axis="u")
+    lobes = _lobes(path, total_reflection)
+    return _isolated(scene, plane, Emissive(pattern=pattern), path, lobes)
+
+
+def _lobes(path: str, total_reflection: bool) -> dict[str, bool]:
+    return {
         "reflection": "R" in path and not total_reflection,
         "transmission": "T" in path or not path,
     }
-    return _isolated(scene, plane, Emissive(pattern=pattern), path, transport)
 
 
 def light_scene(scene: ResolvedScene, plane: Rectangle, path: str) -> ResolvedScene:

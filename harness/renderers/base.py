@@ -46,6 +46,7 @@ class Capability(enum.StrEnum):
     ABSORPTION = "absorption"
     FRESNEL = "fresnel"  # R and T weigh the lobes, unpolarised at each interface
     NESTED = "nested"  # solids inside solids
+    PRIORITY = "priority"  # solids that share faces or overlap partly, by their priority
     CAMERA_INSIDE = "camera-inside"  # camera inside a medium
     RADIANCE_N2 = "radiance-n2"  # radiance scales with the square of the index
 

@@ -35,6 +35,7 @@ USUAL_CLAIMS = frozenset(Capability) - {
     Capability.DOUBLE_DATA,
     Capability.LOBE_SWITCH,
     Capability.THIN_SLAB,
+    Capability.PRIORITY,
     Capability.RADIANCE_N2,
 }
 

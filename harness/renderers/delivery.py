@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from harness import imagefile
-from harness.errors import InputError, RendererFailed
+from harness.errors import ImageNotFinite, InputError, RendererFailed
 from harness.imagefile import Encoding, Info, Pixels
 from harness.scene.resolved import Film
 
@@ -26,7 +28,8 @@ def delivered(
         text = str(problem).removeprefix(f"{problem.file}: ")  # a temporary name tells nobody
         raise RendererFailed(f"wrote an unusable image: {text}", log=log) from error
     if info.nonfinite:
-        raise RendererFailed(f"wrote NaN or infinity in {info.nonfinite} pixels", log=log)
+        where = np.flatnonzero(~np.isfinite(pixels).all(axis=2))
+        raise ImageNotFinite(where.tolist(), width=film.width, log=log)
     return pixels, info
 
 

@@ -57,6 +57,9 @@ def _all_reasons(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
         yield from _of_shape(solid.shape, f"solid {solid.name!r}")
         if solid.exterior != 0:
             yield Capability.NESTED, f"solid {solid.name!r} is inside another"
+        if solid.meets:
+            other = scene.solids[solid.meets[0]].name
+            yield Capability.PRIORITY, f"solid {solid.name!r} touches or overlaps {other!r}"
         if any(scene.media[solid.medium].absorption):
             yield Capability.ABSORPTION, f"solid {solid.name!r} absorbs"
         if scene.transport.reflection:

@@ -31,6 +31,7 @@ from harness.renderers.process import Finished, run_limited
 from harness.renderers.proof import proof_scene, prove
 from harness.scene import resolved as rs
 from harness.translate.povray import MAX_TRACE_LEVEL, PovScene, options, translate
+from harness.translate.povray_stock import translate as translate_stock
 
 MACOS = sys.platform == "darwin"
 INSTALL = "brew install povray" if MACOS else "sudo apt-get install povray"
@@ -58,6 +59,7 @@ class PovRayRenderer:
     """
 
     name = "povray"
+    translate = staticmethod(translate)
     # A process sleeps most of its time: eight keep two cores busy.
     concurrency = 8
     capabilities = frozenset(
@@ -114,7 +116,7 @@ class PovRayRenderer:
     def render(self, scene: rs.ResolvedScene, settings: RenderSettings) -> Image:
         require(scene, self.name, self.capabilities)
         path = self._path()
-        translated = translate(scene)
+        translated = self.translate(scene)
         with tempfile.TemporaryDirectory(prefix="snellcheck-povray-") as name:
             folder = Path(name)
             _write(translated, scene, folder)
@@ -149,13 +151,20 @@ class PovRayRenderer:
     def emit(self, scene: rs.ResolvedScene, folder: Path) -> Path:
         """Writes `scene.pov`, its pictures, and `scene.ini`: ``povray scene.ini`` renders them."""
         folder.mkdir(parents=True, exist_ok=True)
-        return _write(translate(scene), scene, folder)
+        return _write(self.translate(scene), scene, folder)
 
     def _path(self) -> str:
         path = shutil.which(self._executable)
         if path is None:
             raise RendererMissing(f"POV-Ray is not installed: {INSTALL}")
         return path
+
+
+class StockPovRayRenderer(PovRayRenderer):
+    """POV-Ray as its users write for it: see `harness.translate.povray_stock`."""
+
+    name = "povray-stock"
+    translate = staticmethod(translate_stock)
 
 
 def _write(translated: PovScene, scene: rs.ResolvedScene, folder: Path) -> Path:

@@ -18,6 +18,9 @@ from harness.renderers.base import Renderer
 
 GROUP = "snellcheck.renderers"
 Factory = Callable[[], Renderer]
+# Renderers that are asked nothing but checks that name them: they are here to show what a stated
+# way of using a renderer costs, in the scenes that are about it.
+ONLY_WHERE_NAMED = frozenset({"povray-stock"})
 
 # What stands between the harness and an engine in a worker, beside the engine's own adapter.
 HOSTING = ("harness.camera", "harness.renderers.persistent", "harness.renderers.worker")
@@ -109,6 +112,13 @@ def povray() -> Renderer:
     from harness.renderers.povray import PovRayRenderer
 
     return PovRayRenderer()
+
+
+def povray_stock() -> Renderer:
+    """The same with POV-Ray's defaults, as its users write scenes."""
+    from harness.renderers.povray import StockPovRayRenderer
+
+    return StockPovRayRenderer()
 
 
 def mitsuba() -> Renderer:

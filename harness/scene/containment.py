@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -146,45 +145,10 @@ def _depths(shape: resolved.SolidShape, points: Points, tolerance: float) -> NDA
     return depths
 
 
-def containers(shapes: Sequence[resolved.SolidShape], tolerance: float) -> list[int | None]:
-    """For each solid the smallest other one that contains it, None where none does.
-
-    Raises ValueError(i, j) for the first two solids that overlap partly.
-    """
-    around: list[set[int]] = [set() for _ in shapes]
-    for i, j in itertools.combinations(range(len(shapes)), 2):
-        match relation(shapes[i], shapes[j], tolerance):
-            case Relation.OVERLAP:
-                raise ValueError(i, j)
-            case Relation.INSIDE:
-                around[i].add(j)
-            case Relation.AROUND:
-                around[j].add(i)
-    # Of several containers the smallest is the one that lies inside most others.
-    return [max(outer, key=lambda k: len(around[k]), default=None) for outer in around]
-
-
-def innermost(
-    shapes: Sequence[resolved.SolidShape],
-    containers: Sequence[int | None],
-    point: Sequence[float],
-    tolerance: float,
-) -> int | None:
-    """The smallest solid around a point, None outside all; `containers` as of `containers`.
-
-    Raises ValueError(k) where the point lies on the surface of solid k.
-    """
-    found: set[int] = set()
-    for k, shape in enumerate(shapes):
-        low, high = bounds(shape)
-        if np.any(low - tolerance > point) or np.any(high + tolerance < point):
-            continue
-        away = signed_distance(shape, np.array([point], dtype=np.float64))[0]
-        if abs(away) <= tolerance:
-            raise ValueError(k)
-        if away < 0:
-            found.add(k)
-    return next(iter(found - {containers[k] for k in found}), None)
+def surface_points(shape: resolved.SolidShape) -> Points:
+    """Points spread over the surface of a shape; none where nothing is left of a composed one."""
+    low, high = bounds(shape)
+    return _samples(shape, (low + high) / 2)
 
 
 # --- sample points --------------------------------------------------------------------------------
@@ -213,15 +177,15 @@ def _samples(shape: resolved.SolidShape, towards: Points) -> Points:
         case resolved.Lens():
             return _ring_samples(shape.frame, _lens_rings(shape))
         case resolved.Csg():
-            return surface_samples(shape, towards)
+            return _composed_samples(shape, towards)
         case resolved.Mesh():
             vertices = np.array(shape.vertices)
             middles = vertices[np.array(shape.triangles)].mean(axis=1)
             return np.concatenate([vertices, middles])
 
 
-def surface_samples(shape: resolved.Csg, towards: Points) -> Points:
-    """Points of its parts' surfaces that are on its own; none where nothing is left of it."""
+def _composed_samples(shape: resolved.Csg, towards: Points) -> Points:
+    """Points of its parts' surfaces that are on its own."""
     points = np.concatenate([_samples(part, towards) for part in shape.parts])
     within = ON_SURFACE * np.abs(points).max()
     where = region(shape)

@@ -25,7 +25,7 @@ WAYS = ("ior", "glass", "sellmeier", "cauchy", "abbe")  # in which a medium says
 AIR = "air"  # what surrounds everything; a scene may define it otherwise
 AGAINST = frozenset({"truth", "renderers"})
 OBSERVABLES = frozenset(o.value for o in Observable if o not in IMPLIED_OBSERVABLES)
-BUILT_IN = frozenset({"tracer", "povray", "mitsuba", "mitsuba-exact"})
+BUILT_IN = frozenset({"tracer", "povray", "povray-stock", "mitsuba", "mitsuba-exact"})
 
 MOST_NAMES = 30  # that a message lists
 

@@ -117,9 +117,12 @@ Material = Annotated[
 
 
 class Solid(Strict):
+    """Where solids overlap partly, the one of the higher `priority` is there."""
+
     name: Name
     shape: SolidShape
     medium: Name
+    priority: Annotated[int, Field(ge=-1000, le=1000)] = 0
 
 
 class Surface(Strict):

@@ -10,9 +10,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from harness.scene import resolved
-from harness.scene.containment import bounds, containers, innermost, surface_samples
+from harness.scene.containment import bounds, surface_points
 from harness.scene.crosscheck import AIR
 from harness.scene.findings import Attempts, Finding, KeyPath, SceneInvalid, quoted
+from harness.scene.order import innermost, placed
 from harness.scene.resolved import ResolvedScene, Vec3
 from harness.scene.shapes import smallest_feature
 
@@ -20,14 +21,16 @@ MediumAt = Callable[[Sequence[Vec3]], int]
 
 # Relative to the scene: what is smaller, or nearer, is lost in rounding.
 SMALLEST = 1e-9
-CENTRE = np.zeros(3)
 
 
-def nested(scene: ResolvedScene, camera_medium: str | None) -> ResolvedScene:
+def nested(
+    scene: ResolvedScene, camera_medium: str | None, priorities: Sequence[int]
+) -> ResolvedScene:
     """The scene with the media around its solids, thin slabs and camera.
 
-    `camera_medium` is what the scene file says of it. Raises SceneInvalid where solids overlap
-    partly, where the camera's medium is not said or said wrongly, and for what is too small.
+    `camera_medium` and the solids' `priorities` are what the scene file says. Raises SceneInvalid
+    where neither containment nor priority tells which of two solids is there, where the camera's
+    medium is not said or said wrongly, and for what is too small.
     """
     extent = _extent(scene)
     attempts = Attempts()
@@ -36,41 +39,23 @@ def nested(scene: ResolvedScene, camera_medium: str | None) -> ResolvedScene:
     for k, surface in enumerate(scene.surfaces):
         attempts.attempt(("surfaces", k), _check_size, surface, extent)
     attempts.raise_any()
-    tolerance = SMALLEST * extent
-    shapes = [solid.shape for solid in scene.solids]
-    try:
-        outer = containers(shapes, tolerance)
-    except ValueError as overlap:
-        i, j = overlap.args
-        raise SceneInvalid(
-            Finding(
-                ("solids", j, "shape"),
-                f"overlaps solid {scene.solids[i].name} partly",
-                None,
-                "solids that are apart, touch, or lie wholly inside each other",
-            )
-        ) from overlap
+    solids = placed(scene.solids, priorities, SMALLEST * extent)
+    scene = scene.model_copy(update={"solids": solids})
 
     def medium_at(points: Sequence[Vec3]) -> int:
-        inside = {innermost(shapes, outer, point, tolerance) for point in points}
+        inside = {innermost(solids, point, SMALLEST * extent) for point in points}
         if len(inside) > 1:
             raise SceneInvalid(Finding((), "stands in more than one medium"))
         solid = inside.pop()
-        return 0 if solid is None else scene.solids[solid].medium
+        return 0 if solid is None else solids[solid].medium
 
-    solids = tuple(
-        solid.model_copy(update={"exterior": 0 if k is None else scene.solids[k].medium})
-        for solid, k in zip(scene.solids, outer, strict=True)
-    )
     camera = attempts.attempt(("camera",), _camera_in_medium, scene, camera_medium, medium_at)
     surfaces = [
         attempts.attempt(("surfaces", k), _surface_in_medium, surface, medium_at)
         for k, surface in enumerate(scene.surfaces)
     ]
     attempts.raise_any()
-    return scene.model_copy(
-        update={"solids": solids, "surfaces": tuple(surfaces), "camera": camera}
-    )
+    return scene.model_copy(update={"surfaces": tuple(surfaces), "camera": camera})
 
 
 def _extent(scene: ResolvedScene) -> float:
@@ -82,7 +67,7 @@ def _extent(scene: ResolvedScene) -> float:
 
 
 def _check_size(member: resolved.Solid | resolved.Surface, extent: float) -> None:
-    if isinstance(member.shape, resolved.Csg) and not surface_samples(member.shape, CENTRE).size:
+    if isinstance(member.shape, resolved.Csg) and not surface_points(member.shape).size:
         raise SceneInvalid(Finding(("shape",), "nothing is left of it"))
     sizes: dict[KeyPath, float] = {("shape",): smallest_feature(member.shape)}
     if isinstance(member, resolved.Surface) and isinstance(member.material, resolved.ThinSlab):

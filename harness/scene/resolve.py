@@ -96,7 +96,7 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
             max_depth=case.transport.max_depth, min_weight=case.transport.min_weight
         ),
     )
-    return nested(scene, case.camera.medium)
+    return nested(scene, case.camera.medium, [solid.priority for solid in case.solids])
 
 
 # --- parts ----------------------------------------------------------------------------------------

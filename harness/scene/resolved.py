@@ -8,7 +8,9 @@ Conventions
 -----------
 * Right-handed, +Y up, column vectors, lengths in scene units, radiance linear Rec. 709.
 * `ior` is the absolute index of refraction; media[0] is what surrounds everything.
-* A solid is closed, filled with `medium`, and lies wholly inside `exterior`.
+* A solid is closed, filled with `medium`, and lies wholly inside `exterior`. Where it `meets` other
+  solids, because they overlap partly or share faces, what fills a point is the solid of the highest
+  `priority` there, and what two solids share of their faces is one interface between their media.
 * Normals of solids point outwards. A face's front is the side its frame's z axis points to;
   cameras of conformance scenes see emissive faces from the front only.
 * `max_depth` counts path segments: camera to first surface is 1.
@@ -276,11 +278,17 @@ class Medium(Frozen):
 
 
 class Solid(Frozen):
+    """`meets` has the indices of solids that overlap it partly or share a face with it.
+
+    A solid inside another has the higher priority of the two.
+    """
+
     name: str
     shape: SolidShape
     medium: int
     exterior: int
     priority: int = 0
+    meets: tuple[int, ...] = ()
 
 
 class Surface(Frozen):

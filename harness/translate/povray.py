@@ -63,7 +63,7 @@ class PovScene:
 def translate(scene: rs.ResolvedScene) -> PovScene:
     """Raises RendererUnsupported where POV-Ray has no counterpart or no room (see above)."""
     factor, bright = length_scale(scene), exposure(scene)
-    writer = _Writer(scaled(scene, factor), bright)
+    writer = Writer(scaled(scene, factor), bright)
     header = (
         "// povray scene.ini\n"
         f"// lengths are multiplied by {number(factor)}; "
@@ -103,7 +103,7 @@ def options(scene: rs.ResolvedScene) -> str:
 
 
 @dataclass
-class _Writer:
+class Writer:
     """Writes one scene, already scaled in length."""
 
     scene: rs.ResolvedScene
@@ -115,7 +115,7 @@ class _Writer:
         yield _camera(self.scene)
         yield f"background {{ {self._radiance(self.scene.background)} }}"
         if any(self.scene.media[0].absorption):
-            yield _absorption(self.scene.media[0].absorption)
+            yield self.absorption(self.scene.media[0].absorption)
         for light in self.scene.lights:
             yield self._light(light)
         for solid in sorted(self.scene.solids, key=_box_volume, reverse=True):
@@ -124,15 +124,25 @@ class _Writer:
             yield self._surface(surface)
 
     def _settings(self) -> str:
-        transport = self.scene.transport
+        depth, bailout = self.trace_limits()
         return (
             "#version 3.7;\n"
             "global_settings {\n"
             "  assumed_gamma 1.0\n"
-            f"  max_trace_level {min(transport.max_depth, MAX_TRACE_LEVEL):d}\n"
-            f"  adc_bailout {number(max(transport.min_weight, LEAST_ADC_BAILOUT))}\n"
+            f"  max_trace_level {depth:d}\n"
+            f"  adc_bailout {number(bailout)}\n"
             "}"
         )
+
+    def trace_limits(self) -> tuple[int, float]:
+        """`max_trace_level` and `adc_bailout`."""
+        transport = self.scene.transport
+        depth = min(transport.max_depth, MAX_TRACE_LEVEL)
+        return depth, max(transport.min_weight, LEAST_ADC_BAILOUT)
+
+    def absorption(self, per_unit: Sequence[float]) -> str:
+        """Of a medium. Homogeneous, so one sample of one interval is exact."""
+        return f"media {{ absorption {rgb(per_unit)} method 1 intervals 1 samples 1, 1 }}"
 
     def _light(self, light: rs.PointLight) -> str:
         """Radiance of a diffuse face is pigment * colour * cos * 2 fade^2 / r^2, without 1/pi."""
@@ -150,7 +160,7 @@ class _Writer:
         # POV-Ray adds up the absorption of all solids that a ray is in, and of the atmosphere.
         inner, outer = media[solid.medium].absorption, media[solid.exterior].absorption
         more = [i - o for i, o in zip(inner, outer, strict=True)]
-        absorption = f" {_absorption(more)}" if any(more) else ""
+        absorption = f" {self.absorption(more)}" if any(more) else ""
         interior = f"interior {{ ior {number(ior)}{absorption} }}"
         return shape_text(solid.shape, self._dielectric(), interior, "hollow", solid=True)
 
@@ -274,11 +284,6 @@ def _camera(scene: rs.ResolvedScene) -> str:
         f"  up {vector([width * aspect * c for c in camera.up])}\n"
         "}"
     )
-
-
-def _absorption(absorption: Sequence[float]) -> str:
-    """Homogeneous, so one sample of one interval is exact."""
-    return f"media {{ absorption {rgb(absorption)} method 1 intervals 1 samples 1, 1 }}"
 
 
 def _box_volume(solid: rs.Solid) -> float:

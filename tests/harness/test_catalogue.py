@@ -36,6 +36,7 @@ TRUTH = Contender(
 BLIND = {Observable.FOLDED_DIRECTION, Observable.REVERSIBILITY}
 PLATES = (
     "slab",
+    "findings-hit-floor",
     "stack",
     "thin-face",
     "immersed-slab",
@@ -119,3 +120,10 @@ def test_the_truth_passes_and_a_wrong_index_does_not(name: str) -> None:
         plate = name.startswith(PLATES) and check.observable == Observable.EXIT_DIRECTION
         if not blind and not plate:
             assert check.status in (Verdict.FAIL, Verdict.ERROR), (check.id, check.value)
+
+
+def test_the_catalogue_is_as_large_as_it_says() -> None:
+    cases = [case for path in scene_files(scenes_root()) for case in load_cases(path)]
+    assert len(cases) >= 80
+    assert len({case.model.family for case in cases}) >= 18
+    assert len(scene_files(scenes_root())) >= 40

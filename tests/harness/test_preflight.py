@@ -9,7 +9,7 @@ import pytest
 
 from harness.chart import chart, srgb_decode, srgb_encode
 from harness.expected import Float
-from harness.preflight import FINEST, FLOAT32, FLOAT64, Preflight, preflight
+from harness.preflight import FINEST, FLOAT32, FLOAT64, Preflight, preflight, stored_as
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer
@@ -254,3 +254,20 @@ def test_codes_without_their_fine_part_do_not_calibrate() -> None:
         return (pixels + np.roll(pixels, 1, axis=1)) / 2
 
     assert "do not decode" in findings(student(shows=in_codes(smoothed)))
+
+
+@pytest.mark.parametrize(
+    ("pixels", "said"),
+    [
+        (lambda x: x.astype(np.float32), "floats"),
+        (lambda x: x.astype(np.float16), "half floats"),
+        (lambda x: np.round(x * 65535) / 65535, "16 bits"),
+        (lambda x: np.round(x * 255) / 255, "8 bits"),
+        (lambda x: srgb_decode(np.round(srgb_encode(x) * 255) / 255), "8 bits, not linear"),
+    ],
+    ids=["float32", "half", "16-bit", "8-bit", "8-bit sRGB"],
+)
+def test_the_format_of_values_is_named(pixels: Callable[[Float], Float], said: str) -> None:
+    """By the largest error of values between 0.1 and 1, as on the chart."""
+    true = np.linspace(0.1, 1.0, 36001)
+    assert stored_as(1.01 * float(np.abs(pixels(true) - true).max())) == said

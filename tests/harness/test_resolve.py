@@ -195,7 +195,7 @@ def test_rotations_follow_each_other_about_the_centre() -> None:
 @given(shape=solid_shapes(), turns=st.integers(1, 5))
 def test_full_turns_change_nothing(shape: Document, turns: int) -> None:
     placed = shape["of"] if shape["type"] == "polygons" else shape
-    if placed["type"] == "sphere":
+    if placed["type"] in ("sphere", "union", "difference"):
         return
     before = bounds(solid(shape))
     step = {"axis": [1, 2, 2], "angle": 360 / turns}

@@ -14,6 +14,7 @@ from harness.cli.options import (
     chosen_renderers,
     command_option,
     config_option,
+    named_by,
     prepared_cases,
     quality_option,
     renderer_option,
@@ -106,6 +107,8 @@ def command(
 
     chosen = chosen_renderers(renderers, commands, configs)
     cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
+    if not renderers:
+        chosen += named_by(cases)
     helper = next((r for r in chosen if r.name == HELPER), None) or registry.create(HELPER)
     note = None
     if shard is not None:

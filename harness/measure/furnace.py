@@ -1,0 +1,69 @@
+"""A white furnace: lossless glass in a world that shines alike everywhere cannot be seen.
+
+Conservation of energy is the truth here, R + T = 1 at every interface, so no path has to be known.
+The tree of closed forms says what a recursion of limited depth may leave out, pixel by pixel.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from harness.camera import primary_rays
+from harness.measure.comparison import Comparison, Unmeasurable
+from harness.measure.images import Pixels
+from harness.measure.precision import Precision
+from harness.measure.probe_truth import ROUNDINGS
+from harness.measure.statistics import binned
+from harness.scene.resolved import ResolvedScene
+from harness.tree import light_around
+from harness.truth import ClosedForm
+
+# Renderers in float32 start a ray as far from the surface that it leaves; shorter ways they lose.
+STEP_OFF = 2e-4
+FLOAT32 = float(np.finfo(np.float32).eps)
+
+
+def is_furnace(scene: ResolvedScene) -> bool:
+    """Whether the scene is nothing but solids before a background."""
+    return bool(scene.solids) and not scene.surfaces and not scene.lights
+
+
+def energy(
+    scene: ResolvedScene,
+    picture: Pixels,
+    quantum: float,
+    precision: Precision,
+    noise_level: float | None,
+) -> Comparison:
+    """The radiance of every pixel against the background's."""
+    if any(any(medium.absorption) for medium in scene.media):
+        raise Unmeasurable("a furnace tells nothing of glass that absorbs")
+    if not np.isfinite(picture).all():
+        raise Unmeasurable("the picture holds values that are not finite")
+    true = np.array(scene.background)
+    depth, least = scene.transport.max_depth, scene.transport.min_weight
+    light = light_around(ClosedForm(scene), primary_rays(scene), depth, least)
+    measured = picture.reshape(-1, 3).astype(np.float64)
+    keep = np.ones(len(measured), bool)
+    if precision.arithmetic >= FLOAT32:
+        keep = light.closest > STEP_OFF
+    if noise_level is not None:
+        # A path that is cut brings nothing, so only pixels in which hardly any is count.
+        rows = np.flatnonzero(keep & (light.cut < 1e-4))
+        return binned(measured, np.broadcast_to(true, measured.shape), rows, noise_level)
+    # Paths of the least weight that is followed are followed by one and not by another.
+    rounding = ROUNDINGS * depth * precision.arithmetic / 2
+    tolerance = (quantum + np.maximum(light.cut, 0) + 2 * least * depth + rounding) * true.max()
+    error = np.abs(measured - true).max(axis=1)
+    k = int(np.argmax(np.where(keep, error / tolerance, -1)))
+    channel = int(np.argmax(np.abs(measured[k] - true)))
+    width = scene.film.width
+    return Comparison(
+        float(measured[k, channel]), float(true[channel]), float(tolerance[k]),
+        bool(np.all(error[keep] <= tolerance[keep])),
+        "quantum of the image + what the limit of depth may cut in this pixel + weights too small "
+        "to be followed + 8 eps per segment",
+        detail={"max": float(error[keep].max()), "rms": float(np.sqrt((error[keep] ** 2).mean())),
+                "excluded_close": int((~keep).sum()), "largest_cut": float(light.cut[keep].max()),
+                "worst_pixel_x": k % width, "worst_pixel_y": k // width},
+    )  # fmt: skip

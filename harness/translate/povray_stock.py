@@ -1,0 +1,49 @@
+"""A scene as POV-Ray's users write it: with its defaults, at its own scale, coloured by `fade_*`.
+
+The geometry is that of `harness.translate.povray`. What differs is what a tutorial would say, and
+each of it has a price that the catalogue measures:
+
+* `max_trace_level` and `adc_bailout` keep their defaults, 5 and 1/255, where a scene allows more:
+  light that takes longer ways is lost.
+* Lengths are not scaled: hits nearer than 1e-4 units are dropped.
+* Absorption is `fade_power 1001`: T = exp(-(1 - c) L / d), exact on straight ways. A way that ends
+  in a reflection by the finish, total reflection included, is not attenuated at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from harness.scene import resolved as rs
+from harness.translate.povray import PovScene, Writer
+from harness.translate.povray_fit import exposure
+from harness.translate.povray_shapes import number, rgb
+
+TRACE_LEVEL = 5
+ADC_BAILOUT = 1 / 255
+
+
+def translate(scene: rs.ResolvedScene) -> PovScene:
+    """Raises RendererUnsupported where POV-Ray has no counterpart."""
+    bright = exposure(scene)
+    writer = StockWriter(scene, bright)
+    header = (
+        "// povray scene.ini\n"
+        f"// as users write it; radiance is the image divided by {number(bright)}\n"
+    )
+    return PovScene(header + "\n".join(writer.blocks()) + "\n", writer.attachments, bright, 1.0)
+
+
+class StockWriter(Writer):
+    """Writes a scene with POV-Ray's defaults."""
+
+    def trace_limits(self) -> tuple[int, float]:
+        """A scene that asks for less depth, as probes do, gets it."""
+        depth, bailout = super().trace_limits()
+        return min(depth, TRACE_LEVEL), max(bailout, ADC_BAILOUT)
+
+    def absorption(self, per_unit: Sequence[float]) -> str:
+        """In the unit of length that makes the strongest channel's fading colour black."""
+        strongest = max(per_unit)
+        color = rgb([1 - sigma / strongest for sigma in per_unit])
+        return f"fade_power 1001 fade_distance {number(1 / strongest)} fade_color {color}"
