@@ -377,7 +377,7 @@ def test_further_renderers_may_be_named(scene_file: Path) -> None:
         ('a = "x', 1, "not valid TOML: Unterminated string (at end of document)"),
         (b"a = 1\nb = '\xff'\n", 2, "not UTF-8 text"),
         ("a = " + "[" * 3000 + "]" * 3000, None, "nested too deeply"),
-        ("a = " + "9" * 5000, None, "not valid TOML"),
+        ("a = " + "9" * 5000, 1, "not valid TOML: a number of thousands of digits"),
         (b"a = 1\0", 1, "not valid TOML"),
     ],
 )
