@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references findings test fuzz lint format lock ui clean
+.PHONY: help setup suite catalogue references findings test fuzz lint format lock ui bench clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -45,6 +45,9 @@ lock: ## Rebuild requirements/*.txt from pyproject.toml (UPGRADE=1: newer versio
 
 ui: ## Rebuild the report's script from harness/report/ui (needs Node)
 	@cd harness/report/ui && npm ci --silent && npm run --silent build
+
+bench: setup ## Measure the tracer's speed and write reports/bench.json and bench.svg
+	@$(BIN)/python -m tests.bench $(ARGS)
 
 clean: ## Remove the environment, caches and reports
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

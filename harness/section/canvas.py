@@ -23,6 +23,7 @@ Box = tuple[float, float, float, float]  # left, top, right, bottom
 WIDTH = 720.0  # of the drawing, in its own units
 NORMAL, ARC = 44.0, 26.0  # lengths of normals and radii of angles
 LETTER, LINE = 6.6, 15.0  # width and height that a letter of a label takes
+FEW = 24  # corners of an outline, at most, whose edges labels avoid
 FAINTEST = 0.25  # opacity of a ray that carries nothing
 TINTS = (1.0, 2.5)  # indices between which a medium's tint deepens
 INK = (
@@ -53,6 +54,9 @@ class Canvas:
         loops = [self._flat(loop) for loop in outline(solid.shape, self.cut, self.window)]
         if not loops:
             return
+        for loop in loops:
+            if len(loop) <= FEW:  # straight edges, which a text along them would hide
+                self.lines += list(zip(loop, np.roll(loop, -1, axis=0), strict=True))
         medium = scene.media[solid.medium]
         d = " ".join("M" + " L".join(map(_pair, loop)) + "Z" for loop in loops)
         low, high = TINTS

@@ -1,63 +1,25 @@
-"""How fast the tracer is, as ratios within one run: ``python tests/bench/tracer_bench.py``.
-
-Writes reports/bench.json: for each name its `ratio` and the medians that it is made of. Runs of
-both sides take turns, so that a busy machine slows both. No test looks at these numbers.
-"""
+"""The tracer against renderers that are compared with it: POV-Ray, Mitsuba, Embree."""
 
 from __future__ import annotations
 
-import json
 import math
-import platform
-import statistics
-import sys
-import time
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
 import tracer
-from harness.record import write_text
 from harness.renderers.base import RenderSettings
 from harness.renderers.mitsuba import StockEngine
 from harness.renderers.povray import PovRayRenderer
 from harness.scene import resolved
-from harness.scene.load import load_cases
-from harness.scene.resolve import resolve
 from harness.translate.tracer import translate
+from tests.bench.measuring import Figures, icosphere, median, scene_of, seconds
 from tracer.arrays import flatten
 from tracer.mesh import Mesh
 from tracer.patterns import Constant
 from tracer.scene import Emissive, Scene, Surface
 
-ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = RenderSettings(threads=2)
 ROUNDS = 3
-
-Figures = dict[str, float]
-
-
-def seconds(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
-
-
-def median(rounds: list[float]) -> float:
-    return statistics.median(rounds)
-
-
-def scene_of(file: str, size: int) -> resolved.ResolvedScene:
-    scene = resolve(load_cases(ROOT / "scenes" / file, "normal")[0])
-    return scene.model_copy(update={"film": resolved.Film(width=size, height=size)})
-
-
-def icosphere(subdivisions: int) -> tuple[np.ndarray, np.ndarray]:
-    import trimesh
-
-    ball = trimesh.creation.icosphere(subdivisions=subdivisions, radius=1.0)
-    return np.ascontiguousarray(ball.vertices), np.ascontiguousarray(ball.faces, np.int64)
 
 
 def glass_mesh(size: int) -> resolved.ResolvedScene:
@@ -170,39 +132,3 @@ def against_embree() -> Figures:
         "build_s": build,
         "bytes_per_triangle": stored / len(triangles),
     }
-
-
-def threads() -> Figures:
-    scene = translate(scene_of("package/complete.toml", 1024))
-    tracer.render(scene, 8, 8)
-    one = [seconds(lambda: tracer.render(scene, 1024, 1024, 1)) for _ in range(ROUNDS)]
-    two = [seconds(lambda: tracer.render(scene, 1024, 1024, 2)) for _ in range(ROUNDS)]
-    return {"ratio": median(one) / median(two), "one_s": median(one), "two_s": median(two)}
-
-
-BENCHES: dict[str, Callable[[], Figures]] = {
-    "tracer_vs_povray_wall_ball": lambda: against_povray(scene_of("ball/checkerboard.toml", 1024)),
-    "tracer_vs_povray_wall_package": lambda: against_povray(
-        scene_of("package/complete.toml", 1024)
-    ),
-    "tracer_vs_povray_wall_mesh": lambda: against_povray(glass_mesh(1024)),
-    "tracer_vs_mitsuba_equal_error": against_mitsuba,
-    "mesh_rays_vs_embree": against_embree,
-    "threads_speedup": threads,
-}
-
-
-def main(names: list[str]) -> None:
-    figures = {}
-    for name in names or list(BENCHES):
-        figures[name] = BENCHES[name]()
-        shown = "  ".join(f"{key} {value:.4g}" for key, value in figures[name].items())
-        sys.stdout.write(f"{name:32s} {shown}\n")
-        sys.stdout.flush()
-    file = ROOT / "reports" / "bench.json"
-    machine = {"processor": platform.processor() or platform.machine()}
-    write_text(file, json.dumps({"machine": machine, "figures": figures}, indent=1) + "\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
