@@ -12,13 +12,23 @@ from harness.expected import Float
 from harness.measure.images import Pixels
 from harness.measure.raymap import ProbeRays, angles, measured_direction, ray_error
 from harness.report import pack
-from harness.scene.resolved import Convex, Cylinder, Mesh, Rectangle, Solid, Sphere
+from harness.scene.containment import bounds, signed_distance
+from harness.scene.resolved import (
+    Convex,
+    Cylinder,
+    Mesh,
+    Rectangle,
+    Solid,
+    SolidShape,
+    Sphere,
+)
 
 # Rays that can be clicked per side of the film, and rays in the map of errors.
 MOST_PATHS = 64
 MOST_ERRORS = 256
 MOST_TRIANGLES = 6000  # of one solid; larger ones are not outlined
 ROUND = 96  # corners that stand for a circle
+GRID = 40  # points per side of the box in which a composed solid is contoured
 
 
 def write_pack(
@@ -103,10 +113,31 @@ def _solid(solid: Solid) -> dict[str, Any]:
             corners, triangles = _cylinder(cylinder)
         case Mesh() as mesh if len(mesh.triangles) <= MOST_TRIANGLES:
             corners, triangles = np.array(mesh.vertices), list(mesh.triangles)
-        case _:
+        case Mesh():
             return found
+        case shape:
+            corners, triangles = _contoured(shape)
     flat = [corner for triangle in triangles for corner in triangle]
     return {**found, "corners": pack.array(corners, 20), "triangles": flat}
+
+
+def _contoured(shape: SolidShape) -> tuple[Float, list[tuple[int, int, int]]]:
+    """Triangles of any solid that has a signed distance: lenses, cones, composed ones."""
+    from skimage.measure import marching_cubes
+
+    box = np.array(bounds(shape), np.float64)
+    low, high = box.min(axis=0), box.max(axis=0)
+    margin = 0.02 * (high - low).max()
+    low, high = low - margin, high + margin
+    axes = [np.linspace(low[k], high[k], GRID) for k in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    field = np.asarray(signed_distance(shape, points)).reshape(GRID, GRID, GRID)
+    if not field.min() < 0 < field.max():  # thinner than the grid can see
+        return np.zeros((0, 3)), []
+    corners, triangles, *_ = marching_cubes(
+        field, 0.0, spacing=tuple((high - low) / (GRID - 1)), allow_degenerate=False
+    )  # type: ignore[no-untyped-call]
+    return np.asarray(corners + low), [(int(i), int(j), int(k)) for i, j, k in triangles]
 
 
 def _fans(faces: Iterable[Sequence[int]]) -> Iterable[tuple[int, int, int]]:

@@ -245,6 +245,7 @@ class CaseRecord(Model):
     files: dict[str, str] = Field(default_factory=dict)  # name -> relative path: scene.json …
     diagnoses: list[Diagnosis] = Field(default_factory=list)  # of renderers that are off here
     pack: str | None = None  # relative path: pixels and rays as numbers, for the report's pages
+    other_packs: dict[str, str] = Field(default_factory=dict)  # of other runs, by what names them
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", populate_by_name=True, ser_json_inf_nan="strings"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from harness.report.quantity import SUPERSCRIPT, number
@@ -33,9 +33,18 @@ class Axis:
     linear_to: float | None = None
 
     def place(self, value: float) -> float:
+        return self.places([value])[0]
+
+    def places(self, values: Iterable[float]) -> list[float]:
+        """Where values stand; what they have in common is computed once."""
         low, high = self._bend(self.low), self._bend(self.high)
-        share = (self._bend(value) - low) / (high - low)
-        return self.start + (self.end - self.start) * min(1.0, max(0.0, share))
+        room, start = self.end - self.start, self.start
+        bent = values if self.linear_to is None else map(self._bend, values)
+        shares = [(value - low) / (high - low) for value in bent]
+        return [
+            start + room * (0.0 if share < 0.0 else 1.0 if share > 1.0 else share)
+            for share in shares
+        ]
 
     def holds(self, value: float) -> bool:
         return self.low <= value <= self.high

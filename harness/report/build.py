@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from markupsafe import Markup
+
 from harness import record as records
 from harness.errors import InputError
 from harness.record import CaseRecord, Summary, SummaryCase, Verdict
@@ -66,11 +68,15 @@ class _Report:
         self.folder = run_folder
         self.summary = summary
         self.order = view.case_order(summary)
+        self.place = {case.id: k for k, case in enumerate(self.order)}
+        self.next_failing = _next_failing(self.order)
         self.renderers = view.renderer_names(summary)
         self.colours = colour_classes(self.renderers)
         self.trends = Trends(self.renderers, self.colours)
         self.stray: list[str] = []  # record files that belong to no case of the summary
         self.environment = _environment()
+        self.absent = {name for name, known in summary.renderers.items() if known.status != "ok"}
+        self.row_template = self.environment.get_template("row.html.j2")
         self.environment.globals.update(
             colours=self.colours,
             summary=summary,
@@ -80,10 +86,10 @@ class _Report:
             not_finite="#{:02x}{:02x}{:02x}".format(*NOT_FINITE),
         )
 
-    def write_cases(self) -> list[view.Row]:
+    def write_cases(self) -> list[view.Line]:
         """Writes a page per record, and returns the index's rows in their order."""
         cases = {case.id: case for case in self.order}
-        rows: dict[str, view.Row] = {}
+        rows: dict[str, view.Line] = {}
         problems: list[str] = []
         for path in sorted((self.folder / "records").glob("*.json")):
             try:
@@ -111,12 +117,13 @@ class _Report:
     def _page_path(self, case: SummaryCase) -> Path:
         return self.folder / "cases" / page_name(case.id)
 
-    def _row(self, case: SummaryCase, record: CaseRecord | None, note: str) -> view.Row:
+    def _row(self, case: SummaryCase, record: CaseRecord | None, note: str) -> view.Line:
         page = f"cases/{url(page_name(case.id))}" if record else None
         folder = RunFolder(self.folder)
-        return view.row(
+        row = view.row(
             case, record, self.renderers, self.colours, folder, page=page, note=clean(note)
         )
+        return view.line(row, Markup(self.row_template.render(row=row, absent=self.absent)))
 
     def case(self, record: CaseRecord, path: Path) -> str:
         folder = RunFolder(self.folder, up="../")
@@ -153,18 +160,17 @@ class _Report:
         )
 
     def _neighbours(self, case_id: str) -> Neighbours:
-        ids = [case.id for case in self.order]
-        at = ids.index(case_id)
+        at, ids = self.place[case_id], self.order
 
-        def link(k: int) -> tuple[str, str] | None:
-            return (url(page_name(ids[k])), clean(ids[k])) if 0 <= k < len(ids) else None
+        def link(k: int | None) -> tuple[str, str] | None:
+            if k is None or not 0 <= k < len(ids):
+                return None
+            return url(page_name(ids[k].id)), clean(ids[k].id)
 
-        bad = (Verdict.FAIL, Verdict.ERROR)
-        after = range(at + 1, len(ids))
-        failing = next((k for k in after if self.order[k].status in bad), -1)
+        failing = self.next_failing[at]
         return Neighbours(link(at - 1), link(at + 1), link(failing), at + 1, len(ids))
 
-    def index(self, rows: list[view.Row]) -> str:
+    def index(self, rows: list[view.Line]) -> str:
         families = sorted({row.family for row in rows})
         statuses = [v.value for v in records.SEVERITY if any(row.status == v for row in rows)]
         verdict = overview.headline(self.summary)
@@ -173,7 +179,6 @@ class _Report:
             tally=overview.tally(self.summary),
             started=overview.started(self.summary),
             lines=overview.renderer_lines(self.summary, self.renderers, rows),
-            absent={name for name, known in self.summary.renderers.items() if known.status != "ok"},
             rows=rows,
             families=families,
             statuses=statuses,
@@ -193,14 +198,25 @@ class _Report:
         )
 
 
-def _change_chips(rows: list[view.Row]) -> list[tuple[str, str, str]]:
+def _next_failing(order: list[SummaryCase]) -> list[int | None]:
+    """For each case the place of the next one after it that fails."""
+    found: list[int | None] = []
+    ahead: int | None = None
+    for k in range(len(order) - 1, -1, -1):
+        found.append(ahead)
+        if order[k].status in (Verdict.FAIL, Verdict.ERROR):
+            ahead = k
+    return found[::-1]
+
+
+def _change_chips(rows: list[view.Line]) -> list[tuple[str, str, str]]:
     """(state, tone, word) of each state that cases are in, where there is more than one."""
     states = {row.change.state: row.change for row in rows if row.change}
     known = [states[state.value] for state in changes.ORDER if state.value in states]
     return [(c.state, c.tone, c.text) for c in known] if len(known) > 1 else []
 
 
-def _page_of(rows: list[view.Row], case_id: str) -> str | None:
+def _page_of(rows: list[view.Line], case_id: str) -> str | None:
     return next((row.page for row in rows if row.id == clean(case_id)), None)
 
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from harness.record import Curve, Series
 from harness.report.axis import Axis, drawable, for_residuals, spanning
@@ -22,7 +22,7 @@ WIDTH, LEFT, RIGHT, TOP = 720, 62, 706, 24
 MAIN_END = 232  # bottom of the upper panel
 RESIDUAL_START, RESIDUAL_END = 288, 424
 MOST_POINTS = 400  # per line; more are reduced to the extremes of each stretch
-MARKS = 16  # per line
+MARKS = 12  # per line
 
 # Relative paths; with its colour each renderer has its shape, for those who see no difference.
 SHAPES = {
@@ -93,7 +93,7 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
     y_axis = for_residuals(values, band, height - 1, 1)
     points = list(zip(residual.x, residual.y, strict=False))
     runs = [_thinned(run, width // 2) for run in _finite_runs(points)]
-    placed = [[(x_axis.place(x), y_axis.place(y)) for x, y in run] for run in runs]
+    placed = [_placed(run, x_axis, y_axis) for run in runs]
     step = max(1, len(residual.x) // 8)
     few = [*range(0, len(residual.x) - 1, step), len(residual.x) - 1]
     tolerance = [curve.tolerance[k] for k in few if k < len(curve.tolerance)]
@@ -193,8 +193,8 @@ def _band_outline(
     """There along the upper edge, back along the lower."""
     pairs = zip(xs, tolerance, strict=False)
     known = [(x, t) for x, t in pairs if drawable(x) and drawable(t)]
-    upper = [(x_axis.place(x), y_axis.place(t)) for x, t in known]
-    lower = [(x_axis.place(x), y_axis.place(-t)) for x, t in reversed(known)]
+    upper = _placed(known, x_axis, y_axis)
+    lower = _placed([(x, -t) for x, t in reversed(known)], x_axis, y_axis)
     return _path(upper + lower) + "z" if known else ""
 
 
@@ -211,7 +211,7 @@ def _line(
     colour = colours.get(series.renderer, "c7")
     points = list(zip(series.x, series.y, strict=False))
     runs = [_thinned(run) for run in _finite_runs(points)]
-    placed = [[(x_axis.place(x), y_axis.place(y)) for x, y in run] for run in runs]
+    placed = [_placed(run, x_axis, y_axis) for run in runs]
     parts = [Markup('<path class="line" d="{}"/>').format("".join(map(_path, placed)))]
     if colour in SHAPES:
         parts += _marks(series, points, (x_axis, y_axis), SHAPES[colour], phase)
@@ -232,16 +232,14 @@ def _marks(
     every = max(1.0, len(points) / MARKS)
     count = min(len(points), MARKS)
     chosen = {min(len(points) - 1, int((k + phase) * every)) for k in range(count)}
-    for k in sorted(chosen):
-        x, y = points[k]
-        if not (drawable(x) and drawable(y)):
-            continue
+    shown = [points[k] for k in sorted(chosen) if all(map(drawable, points[k]))]
+    name = escape(clean(series.renderer))
+    for (x, y), (at_x, at_y) in zip(shown, _placed(shown, x_axis, y_axis), strict=True):
         beyond = "" if y_axis.holds(y) else " (beyond the axis)"
-        yield Markup('<path class="mark" d="M{:.1f} {:.1f}{}"><title>{}</title></path>').format(
-            x_axis.place(x),
-            y_axis.place(y),
-            shape,
-            f"{clean(series.renderer)}: {number(x, digits=6)}, {number(y, digits=6)}{beyond}",
+        # Numbers need no escaping, and there are many of them.
+        yield Markup(
+            f'<path class="mark" d="M{at_x:.1f} {at_y:.1f}{shape}"><title>'
+            f"{name}: {number(x, digits=6)}, {number(y, digits=6)}{beyond}</title></path>"
         )
 
 
@@ -266,6 +264,11 @@ def _thinned(run: list[Point], most: int = MOST_POINTS) -> list[Point]:
         ends = {min(part, key=lambda p: p[1]), max(part, key=lambda p: p[1])}
         kept += [point for point in part if point in ends][:2]
     return kept
+
+
+def _placed(points: Sequence[Point], x_axis: Axis, y_axis: Axis) -> list[Point]:
+    xs, ys = x_axis.places([x for x, _ in points]), y_axis.places([y for _, y in points])
+    return list(zip(xs, ys, strict=True))
 
 
 def _path(points: Sequence[Point]) -> str:

@@ -6,11 +6,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import groupby
 
 from harness.record import Check, Diagnosis, Summary, Verdict
 from harness.report.links import clean
 from harness.report.quantity import count, number
-from harness.report.view import CheckView, Row, check_view
+from harness.report.view import CheckView, Line, check_view
 
 EXIT_CODES = {
     0: "all passed",
@@ -179,10 +180,15 @@ def started(summary: Summary) -> str:
 
 @dataclass(frozen=True)
 class Mark:
-    """A case in a renderer's strip; what is wrong stands taller, so that colour is not needed."""
+    """A case in a renderer's strip; what is wrong stands taller, so that colour is not needed.
+
+    In long strips a mark stands for `span` cases of one verdict, from the `start`th on.
+    """
 
     status: Verdict | None
     height: int
+    start: int
+    span: int
     title: str
     page: str | None
 
@@ -214,12 +220,12 @@ class RendererLine:
 
 
 def renderer_lines(
-    summary: Summary, names: Sequence[str], rows: Sequence[Row]
+    summary: Summary, names: Sequence[str], rows: Sequence[Line]
 ) -> list[RendererLine]:
     return [_line(name, column, summary, rows) for column, name in enumerate(names)]
 
 
-def _line(name: str, column: int, summary: Summary, rows: Sequence[Row]) -> RendererLine:
+def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> RendererLine:
     known = summary.renderers.get(name)
     checks = [c for case in summary.cases for c in case.checks if c.renderer == name]
     verdicts = Counter(check.status for check in checks)
@@ -238,7 +244,7 @@ def _line(name: str, column: int, summary: Summary, rows: Sequence[Row]) -> Rend
             )
             for key, value in facts.items()
         ],
-        strip=[_mark(row, column) for row in rows],
+        strip=_strip(rows, column),
         tally=", ".join(f"{n} {verdict.value}" for verdict, n in verdicts.items()),
         checks=len(checks),
         passed=verdicts[Verdict.PASS] + verdicts[Verdict.KNOWN],
@@ -246,7 +252,25 @@ def _line(name: str, column: int, summary: Summary, rows: Sequence[Row]) -> Rend
     )
 
 
-def _mark(row: Row, column: int) -> Mark:
-    status = row.cells[column].status
-    word = status.value if status else "took no part"
-    return Mark(status, HEIGHTS[status], f"{row.id}: {word}", row.page)
+MOST_MARKS = 150  # that can still be told apart, and clicked
+
+
+def _strip(rows: Sequence[Line], column: int) -> list[Mark]:
+    if len(rows) <= MOST_MARKS:
+        return [_mark(row, column, k) for k, row in enumerate(rows)]
+    found, start = [], 0
+    for status, group in groupby(row.verdicts[column] for row in rows):
+        span = len(list(group))
+        title = f"{count(span, 'case')}: {_word(status)}"
+        found.append(Mark(status, HEIGHTS[status], start, span, title, None))
+        start += span
+    return found
+
+
+def _mark(row: Line, column: int, start: int) -> Mark:
+    status = row.verdicts[column]
+    return Mark(status, HEIGHTS[status], start, 1, f"{row.id}: {_word(status)}", row.page)
+
+
+def _word(status: Verdict | None) -> str:
+    return status.value if status else "took no part"

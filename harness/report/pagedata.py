@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,20 +20,30 @@ def case_data(
     record: CaseRecord, folder: RunFolder, colours: Mapping[str, str], charts: Sequence[Chart]
 ) -> Markup:
     """The data block's text: JSON in which nothing can end a script element."""
-    href = folder.href(record.pack)
+    packs = {"": record.pack, **record.other_packs}
+    found = [(prefix, folder.href(path)) for prefix, path in packs.items()]
     verdicts = {run.name: renderer_verdict(run.name, record.checks, run) for run in record.runs}
     return embeddable(
         {
             "id": record.id,
-            "packs": [{"href": href, "prefix": ""}] if href else [],
+            "packs": [{"href": href, "prefix": clean(prefix)} for prefix, href in found if href],
             "colours": dict(colours),
             "verdicts": {name: verdict for name, verdict in verdicts.items() if verdict},
+            "suspects": _suspects(record),
             "absent": [_absent(run) for run in record.runs if not run.images],
             "curves": [
                 _curve(curve, chart) for curve, chart in zip(record.curves, charts, strict=True)
             ],
         }
     )
+
+
+def _suspects(record: CaseRecord) -> list[str]:
+    """Renderers that are said to be off, those named most often first."""
+    named = [name for check in record.checks if check.attribution for name in check.attribution.off]
+    bad = (Verdict.FAIL, Verdict.ERROR)
+    named += [c.renderer for c in record.checks if c.against == "truth" and c.status in bad]
+    return [clean(name) for name, _ in Counter(named).most_common()]
 
 
 def embeddable(data: object) -> Markup:

@@ -6,7 +6,6 @@ failures and draws the bars.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -214,7 +213,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class Row:
-    """`sort` holds what columns are sorted by: error over tolerance of the case and by column."""
+    """`sort` holds what columns are sorted by: error over tolerance of each cell's worst check."""
 
     id: str
     name: str
@@ -229,6 +228,24 @@ class Row:
     sort: str
     change: Change | None
     diagnoses: list[tuple[str, str]]  # (renderer, sentence)
+
+
+@dataclass(frozen=True)
+class Line:
+    """What the index needs of a row once it is written out: little, for there may be thousands."""
+
+    id: str
+    family: str
+    status: Verdict
+    page: str | None
+    change: Change | None
+    verdicts: tuple[Verdict | None, ...]
+    html: Markup
+
+
+def line(row: Row, html: Markup) -> Line:
+    verdicts = tuple(cell.status for cell in row.cells)
+    return Line(row.id, row.family, row.status, row.page, row.change, verdicts, html)
 
 
 def split_id(case_id: str) -> tuple[str, list[tuple[str, str]]]:
@@ -265,17 +282,15 @@ def row(
         page=page,
         cells=cells,
         worst=_worst(record, curve, cells, colours, folder) if record else None,
-        sort=_sort_keys(case, cells),
+        sort=_sort_keys(cells),
         change=change(case.checks),
         diagnoses=[(d.renderer, clean(d.sentence)) for d in case.diagnoses],
     )
 
 
-def _sort_keys(case: SummaryCase, cells: Sequence[Cell]) -> str:
-    """JSON: the verdict's place, and how much of its tolerance the worst check uses."""
-    ratios = [_sortable(cell.main.ratio) if cell.main else -1.0 for cell in cells]
-    keys = {"status": SEVERITY.index(case.status), "worst": max(ratios, default=-1.0)}
-    return json.dumps(keys | {f"r{k}": ratio for k, ratio in enumerate(ratios)})
+def _sort_keys(cells: Sequence[Cell]) -> str:
+    """How much of its tolerance each cell's worst check uses; -1 where it is not known."""
+    return " ".join(f"{_sortable(cell.main.ratio if cell.main else None):g}" for cell in cells)
 
 
 def _sortable(ratio: float | None) -> float:

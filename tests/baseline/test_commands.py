@@ -303,7 +303,10 @@ def test_stored_results_stand_in_for_a_missing_renderer(
     work: Invoke, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(REGISTERED, "student", lambda: Absent(RendererMissing("gone"), "student"))
-    monkeypatch.setattr("harness.renderers.registry.available", lambda: ["student", "tracer"])
+    monkeypatch.setattr(
+        "harness.renderers.registry.available",
+        lambda: {name: REGISTERED[name] for name in ("student", "tracer")},
+    )
     result = work("run", "slab", "ball", "--scenes", SCENES, "--out", "out")
     assert result.exit_code == 0, result.output
     assert "stored results of 1.0" in result.output.replace("\n", " ")

@@ -12,8 +12,10 @@ from hypothesis.extra.numpy import arrays
 
 from harness import imagefile
 from harness import record as records
+from harness.packing import _solid
 from harness.renderers.registry import create
 from harness.report import pack
+from harness.scene.resolved import Frame, Lens, Solid
 from tests.harness.tiny import run_tiny
 from tests.harness.unpack import floats, pixels, read_pack
 
@@ -88,3 +90,16 @@ def test_rays_know_their_error_and_their_way(tmp_path: Path) -> None:
     landed = ~np.isnan(last[0])
     assert landed.any()
     assert np.abs(first - last)[:, landed].max() < 1e-3
+
+
+def test_composed_solids_are_drawn_as_closed_triangles() -> None:
+    """A biconvex lens, which no other rule of drawing knows: its size is that of the lens."""
+    frame = Frame(origin=(1, 2, 3), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
+    lens = Lens(frame=frame, thickness=0.6, radii=(2.0, -2.0), conics=(0, 0), aperture=0.8)
+    drawn = _solid(Solid(name="lens", shape=lens, medium=1, exterior=0))
+    corners = floats(drawn["corners"]["data"]).reshape(-1, 3)
+    triangles = np.array(drawn["triangles"]).reshape(-1, 3)
+    assert np.ptp(corners, axis=0) == pytest.approx([1.6, 1.6, 0.6], rel=0.05)
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    _, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 2).all()

@@ -68,7 +68,7 @@ def rewritten(monkeypatch: pytest.MonkeyPatch, old: str, new: str) -> None:
             made.sdl.replace(old, new), made.attachments, made.exposure, made.length_scale
         )
 
-    monkeypatch.setattr("harness.renderers.povray.translate", changed)
+    monkeypatch.setattr(PovRayRenderer, "translate", staticmethod(changed))
 
 
 def test_warnings_reach_the_log(monkeypatch: pytest.MonkeyPatch) -> None:

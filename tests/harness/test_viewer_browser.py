@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("playwright.sync_api", reason="uv pip install playwright")
 
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from harness import imagefile
 from harness import record as records
@@ -58,9 +58,19 @@ def panes(page: Page) -> list[str]:
     return [c.get_attribute("aria-label") or "" for c in page.locator(".pane canvas").all()]
 
 
-def hash_of(page: Page) -> str:
-    page.wait_for_timeout(200)
-    return str(page.evaluate("location.hash"))
+def wait_for_hash(page: Page, part: str, *, there: bool = True) -> None:
+    """Waits until the address holds `part`, or does not: the page writes it a little later."""
+    held = "part => decodeURIComponent(location.hash).includes(part)"
+    page.wait_for_function(held if there else held.replace("=> ", "=> !"), arg=part, timeout=5000)
+
+
+def wait_for_colours(page: Page) -> None:
+    """Waits until a pane shows more than one colour."""
+    for _ in range(50):
+        if len(colours_of(page)) > 1:
+            return
+        page.wait_for_timeout(100)
+    pytest.fail("the pane shows one colour alone")
 
 
 def colours_of(page: Page, pane: int = 0) -> list[list[int]]:
@@ -94,8 +104,7 @@ def test_every_mode_has_its_panes(page: Page, run: Path) -> None:
     for label, wanted in expected.items():
         page.get_by_role("button", name=label, exact=True).click()
         assert panes(page) == wanted, label
-        page.wait_for_timeout(60)
-        assert len(colours_of(page)) > 1, label
+        wait_for_colours(page)
 
 
 def test_ray_errors_are_shown_per_renderer(page: Page, run: Path) -> None:
@@ -141,7 +150,7 @@ def test_worst_pixels_are_the_worst(page: Page, run: Path) -> None:
     first = page.locator(".jump").first
     assert f"({x}, {y})" in first.inner_text()
     first.click()
-    assert f"pin={x},{y}" in hash_of(page).replace("%2C", ",")
+    wait_for_hash(page, f"pin={x},{y}")
     assert page.locator(".inspector h3").first.inner_text() == f"Pixel ({x}, {y}), pinned"
 
 
@@ -170,7 +179,7 @@ def test_curves_tell_their_values_and_show_the_ray(page: Page, run: Path) -> Non
     assert "tracer" in readout.inner_text()
     assert "°" in readout.inner_text()
     chart.click(position={"x": 300, "y": 100})
-    assert "pin=" in hash_of(page)
+    wait_for_hash(page, "pin=")
 
 
 # --- keys -----------------------------------------------------------------------------------------
@@ -184,19 +193,19 @@ def test_keys_do_what_the_help_says(page: Page, run: Path) -> None:
     }  # fmt: skip
     for key, wanted in steps.items():
         page.keyboard.press(key)
-        assert wanted in hash_of(page), key
+        wait_for_hash(page, wanted)
     page.keyboard.press("f")
-    assert "view=" not in hash_of(page)
+    wait_for_hash(page, "view=", there=False)
     page.keyboard.press("r")
-    assert "ev=" not in hash_of(page)
+    wait_for_hash(page, "ev=", there=False)
     page.keyboard.press("E")
-    assert "ev=-0.5" in hash_of(page)
+    wait_for_hash(page, "ev=-0.5")
     page.keyboard.press("1")
-    assert "a=tracer" in hash_of(page)
+    wait_for_hash(page, "a=tracer")
     page.keyboard.press("Shift+Digit2")
-    assert "b=student" in hash_of(page)
+    wait_for_hash(page, "b=student")
     page.keyboard.press("ArrowRight")
-    assert "a=tracer" not in hash_of(page)
+    wait_for_hash(page, "a=tracer", there=False)
     page.keyboard.press("?")
     help_text = page.locator("dialog.help").inner_text()
     assert "exposure" in help_text
@@ -209,11 +218,9 @@ def test_holding_shift_shows_the_reference(page: Page, run: Path) -> None:
     which = page.locator(".pane .which")
     assert which.inner_text() == "A"
     page.keyboard.down("Shift")
-    page.wait_for_timeout(60)
-    assert which.inner_text() == "B"
+    expect(which).to_have_text("B")
     page.keyboard.up("Shift")
-    page.wait_for_timeout(60)
-    assert which.inner_text() == "A"
+    expect(which).to_have_text("A")
 
 
 def test_keys_mean_nothing_while_typing(page: Page, run: Path) -> None:
@@ -231,10 +238,9 @@ def test_a_permalink_brings_everything_back(page: Page, run: Path) -> None:
     assert page.locator(".exposure output").inner_text() == "−1.5"
     assert page.locator(".inspector h3").first.inner_text() == "Pixel (11, 7), pinned"
     page.keyboard.press("m")
-    again = hash_of(page).replace("%2C", ",").replace("%3B", ";")
-    assert "view=12.5,9,20" in again
-    assert "pin=3,4;11,7" in again
-    assert "every" not in again
+    wait_for_hash(page, "every", there=False)
+    wait_for_hash(page, "view=12.5,9,20")
+    wait_for_hash(page, "pin=3,4;11,7")
 
 
 def test_nonsense_in_a_permalink_is_left_out(page: Page, run: Path) -> None:

@@ -23,6 +23,7 @@ from tests.stress.figures import note
 
 TIMEOUT_S, MEMORY_MB = 2.0, 200
 LATE_S = 2.0  # by how much a limit may be passed
+PATIENCE_S = 60.0  # where another limit is to be met first, however busy the machine
 
 ONE_SHOT = {
     "crash": "ended with exit code 3",
@@ -31,7 +32,7 @@ ONE_SHOT = {
     "leak": "used more than 200 MB",
     "leak-in-child": "used more than 200 MB",
     "flood": "wrote too much to stdout and stderr",
-    "flood-file": "ended by signal SIGXFSZ",
+    "flood-file": "512 MB",  # by the system, or by our own look at the folder, which may be first
     "fork-bomb": "used more than 200 MB",
     "many-files": "wrote more than",
     "truncated": "the image is truncated",
@@ -49,7 +50,7 @@ PERSISTENT = {
     "leak": "used more than 200 MB",
     "leak-in-child": "used more than 200 MB",
     "flood": "answered 'All work",
-    "flood-file": "SIGXFSZ",
+    "flood-file": "512 MB",
     "fork-bomb": "used more than 200 MB",
     "many-files": "wrote more than",
     "truncated": "the image is truncated",
@@ -109,9 +110,10 @@ def test_one_fault_costs_one_result(
 ) -> None:
     odd, right = Odd(way(mode)), student(name="right")
     cases = prepared("snell", "slab")
+    timeout_s = TIMEOUT_S if mode == "hang" else PATIENCE_S
     summary = run(
         cases, [odd, right], student(name="helper"), tmp_path,
-        timeout_s=TIMEOUT_S, memory_mb=MEMORY_MB,
+        timeout_s=timeout_s, memory_mb=MEMORY_MB,
     )  # fmt: skip
     expected = (ONE_SHOT if way is one_shot else PERSISTENT)[mode]
     (failed,) = [c for c in checks_of(summary, "odd") if c.status is not Verdict.PASS]
@@ -121,7 +123,7 @@ def test_one_fault_costs_one_result(
     assert {c.status for c in checks_of(summary, "right")} == {Verdict.PASS}
     assert summary.exit_code == 3
     assert not list(tmp_path.rglob("unpickled"))
-    assert odd.slowest < TIMEOUT_S + LATE_S
+    assert odd.slowest < timeout_s + LATE_S
     kind = "run for each image" if way is one_shot else "kept alive"
     outcome = f"ERROR “{expected}”, all other results stand; the slowest took {odd.slowest:.2f} s"
     note(f"A program {kind}", mode, 1, outcome)

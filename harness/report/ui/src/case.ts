@@ -10,6 +10,7 @@ export interface CaseData {
   readonly packs: readonly PackSource[];
   readonly colours: Readonly<Record<string, string>>; // renderer → class of the stylesheet
   readonly verdicts: Readonly<Record<string, string>>;
+  readonly suspects: readonly string[]; // renderers that are said to be off, worst first
   readonly absent: readonly { readonly name: string; readonly word: string; readonly reason: string }[];
   readonly curves: readonly CurveData[];
 }

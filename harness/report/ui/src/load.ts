@@ -39,6 +39,9 @@ function fromScript(source: string): Promise<StoredPack> {
 export function loadPack(source: string): Promise<StoredPack> {
   const inside = embedded(source);
   if (inside) return Promise.resolve(checked(inside));
+  if (document.documentElement.hasAttribute("data-single")) {
+    return Promise.reject(new Error("there was no room for them in this single file"));
+  }
   window.snellcheckPack = (pack) => waiting?.(pack);
   const mine = queue.then(() => fromScript(source)).then(checked);
   queue = mine.catch(() => undefined);

@@ -6,10 +6,12 @@ import { bindCaseKeys, startCase } from "./casepage";
 import { dataBlock } from "./dom";
 import { bind, helpDialog, listen } from "./keys";
 import { startMatrix } from "./matrix";
+import { startSingle } from "./single";
 
 document.documentElement.classList.add("scripted");
 
 function start(): void {
+  startSingle();
   const data = dataBlock<CaseData>("case-data");
   const run = document.querySelector<HTMLMetaElement>('meta[name="snellcheck-run"]')?.content ?? "";
   let help: HTMLDialogElement | null = null;

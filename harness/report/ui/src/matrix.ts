@@ -1,19 +1,20 @@
 // The index: filter chips, search, sorting, and where all of that stands in the address.
 
+import { readAddress, writeAddress } from "./address";
 import { bind } from "./keys";
 
 interface Row {
   readonly element: HTMLElement;
-  readonly text: string;
   readonly name: string;
   readonly family: string;
   readonly status: string;
   readonly change: string;
   readonly cells: readonly string[];
   readonly order: number;
-  readonly sort: Readonly<Record<string, string | number>>;
+  readonly ratios: readonly number[];
 }
 
+const SEVERITY = ["error", "fail", "skip", "known", "pass"];
 const FILTERS = ["status", "family", "renderer", "change"] as const;
 
 export function startMatrix(): void {
@@ -29,6 +30,13 @@ export function startMatrix(): void {
   const matrix = document.querySelector(".matrix") as HTMLElement;
   let sorted = { by: "", down: false };
 
+  const texts = new Map<Row, string>(); // read when they are first searched
+  const textOf = (row: Row): string => {
+    let text = texts.get(row);
+    if (text === undefined) texts.set(row, (text = (row.element.textContent ?? "").toLowerCase()));
+    return text;
+  };
+
   const chosen = (filter: string): string[] => chips
     .filter((c) => c.dataset["filter"] === filter && c.getAttribute("aria-pressed") === "true")
     .map((c) => c.dataset["value"] ?? "");
@@ -41,7 +49,7 @@ export function startMatrix(): void {
     for (const row of rows) {
       // With renderers chosen, a status means theirs; otherwise that of the case as a whole.
       const own = renderers.length ? renderers.map((k) => row.cells[Number(k)] ?? "-") : [row.status];
-      const visible = words.every((word) => row.text.includes(word)) &&
+      const visible = words.every((word) => textOf(row).includes(word)) &&
         (!families.length || families.includes(row.family)) &&
         (!changes.length || changes.includes(row.change)) &&
         (!statuses.length || own.some((status) => statuses.includes(status)));
@@ -65,7 +73,12 @@ export function startMatrix(): void {
 
   function order(by: string, down: boolean): void {
     sorted = { by, down };
-    const value = (row: Row): string | number => by === "case" ? row.name : by === "" ? -row.order : row.sort[by] ?? row.order;
+    const value = (row: Row): string | number => {
+      if (by === "case") return row.name;
+      if (by === "status") return SEVERITY.indexOf(row.status);
+      if (by === "worst") return Math.max(...row.ratios);
+      return by ? row.ratios[Number(by.slice(1))] ?? -1 : -row.order;
+    };
     const ordered = [...rows].sort((p, q) => {
       const [a, b] = [value(p), value(q)];
       // Of figures the largest come first; of names the first.
@@ -82,8 +95,8 @@ export function startMatrix(): void {
   }
 
   function recall(): void {
-    if (!location.hash.includes("=")) return;
-    const hash = new URLSearchParams(location.hash.slice(1));
+    const hash = new URLSearchParams(readAddress());
+    if (!hash.size) return;
     search!.value = hash.get("q") ?? "";
     for (const chip of chips) {
       const on = hash.getAll(chip.dataset["filter"] ?? "").includes(chip.dataset["value"] ?? "");
@@ -137,13 +150,12 @@ export function startMatrix(): void {
 }
 
 function readRow(element: HTMLElement, order: number): Row {
-  const { family = "", status = "", cells = "", change = "", sort = "{}" } = element.dataset;
+  const { family = "", status = "", cells = "", change = "", sort = "" } = element.dataset;
   return {
     element, order, family, status, change,
     name: element.querySelector(".case")?.querySelector(".name")?.textContent ?? "",
-    text: (element.textContent ?? "").toLowerCase(),
     cells: cells.trim().split(" "),
-    sort: JSON.parse(sort) as Record<string, string | number>,
+    ratios: sort.split(" ").map(Number),
   };
 }
 
@@ -152,8 +164,5 @@ function remember(state: Record<string, string[]>): void {
   for (const [key, values] of Object.entries(state)) {
     for (const value of values) if (value) hash.append(key, value);
   }
-  const text = hash.toString();
-  if (text || location.hash.includes("=")) {
-    history.replaceState(null, "", text ? `#${text}` : location.pathname);
-  }
+  writeAddress(hash.toString());
 }

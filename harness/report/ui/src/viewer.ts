@@ -1,22 +1,26 @@
 // The viewer of a case: pictures under one camera, in the mode that the state names.
 
+import { readAddress, writeAddress } from "./address";
 import type { CaseData } from "./case";
-import { type Encoding, type Scale, shadeFigures, shadeRadiance } from "./colour";
+import type { Scale } from "./colour";
+import { paneLabel, problemOf } from "./captions";
 import { colourBar } from "./colourbar";
 import { Controls } from "./controls";
 import { h, reducedMotion } from "./dom";
 import { number } from "./format";
+import { firstPair } from "./firstpair";
 import { Inspector } from "./inspector";
-import { bind } from "./keys";
+import { arranged } from "./layout";
 import { MAPS } from "./maps";
 import type { Image } from "./pack";
 import { type Layer, Pane, type Sheet } from "./pane";
 import { RayPanel } from "./raypanel";
 import type { Rays } from "./rays";
-import { fromHash, type Mode, MODE_NAMES, MODES, type Pixel, toHash, type ViewState } from "./state";
+import { Sheets } from "./sheets";
+import { fromHash, type Mode, type Pixel, toHash, type ViewState } from "./state";
+import { bindViewerKeys } from "./viewerkeys";
 
 const BLINK = 650; // ms
-const BARE: Partial<Record<Mode, true>> = { side: true, rays: true }; // look at no pair
 
 export class Viewer {
   readonly element: HTMLElement;
@@ -25,7 +29,7 @@ export class Viewer {
   private readonly initial: ViewState;
   private state: ViewState;
   private readonly figuresCache = new Map<string, Float32Array>();
-  private readonly sheets = new Map<string, { key: string; sheet: Sheet }>();
+  private readonly sheets = new Sheets();
   private panes: Pane[] = [];
   private readonly stage = h("div", { class: "stage" });
   private readonly bar = h("div", { class: "bar-row" });
@@ -39,6 +43,8 @@ export class Viewer {
   private held = false;
   private timer = 0;
   private scheduled = false;
+  private blinking = 0;
+  private places = 1; // panes, and those that say why there is none
 
   constructor(
     private readonly data: CaseData, images: readonly Image[], private readonly rays: readonly Rays[],
@@ -46,12 +52,11 @@ export class Viewer {
   ) {
     this.images = new Map(images.map((image) => [image.name, image]));
     this.names = [...this.images.keys()];
-    const [first = "", second = first] = this.preferred();
     this.initial = {
-      mode: "side", a: second, b: first, every: true, exposure: 0, encoding: "srgb",
+      mode: "side", ...firstPair(data, this.names), every: true, exposure: 0, encoding: "srgb",
       camera: null, pins: [],
     };
-    this.state = fromHash(location.hash, this.initial, this.names);
+    this.state = fromHash(readAddress(), this.initial, this.names);
     this.inspector = new Inspector((pixel) => this.jump(pixel), () => this.unpin());
     this.rayPanel = new RayPanel(rays, data.colours);
     this.controls = new Controls(this.names, rays.length > 0, {
@@ -62,6 +67,7 @@ export class Viewer {
     });
     this.element = h("div", { class: "viewer", tabindex: 0, role: "group",
       "aria-label": "Picture viewer; press ? for its keys" },
+      h("h2", { class: "hidden" }, "Viewer"),
       this.controls.element,
       h("div", { class: "viewer-body" },
         h("div", { class: "stage-column" }, this.stage, this.controls.slider, this.bar, this.notice),
@@ -70,24 +76,26 @@ export class Viewer {
     place.replaceChildren(this.element);
     place.after(this.rayPanel.element);
     new ResizeObserver(() => this.layout()).observe(this.stage);
-    this.bindKeys();
+    bindViewerKeys({
+      names: this.names,
+      hasRays: this.rays.length > 0,
+      state: () => this.state,
+      focused: () => this.element.contains(document.activeElement),
+      update: (change) => this.update(change),
+      choose: (which, name) => this.choose(which, name),
+      zoom: (factor) => this.zoom(factor),
+      trueSize: () => this.update({ camera: { ...this.current(this.panes[0]), scale: 1 } }),
+      hold: (down) => this.hold(down),
+      unpin: () => this.unpin(),
+    });
     addEventListener("hashchange", () => {
       if (location.hash.includes("=") || location.hash === "") this.restore();
     });
     this.rebuild();
   }
 
-  /** The tracer, if it took part, is what others are compared with at first; the worst is A. */
-  private preferred(): string[] {
-    const rank = (name: string): number =>
-      ({ fail: 0, error: 1, known: 2 })[this.data.verdicts[name] ?? ""] ?? 3;
-    const base = this.names.find((n) => n === "tracer") ?? this.names[0] ?? "";
-    const others = this.names.filter((n) => n !== base).sort((p, q) => rank(p) - rank(q));
-    return [base, ...others];
-  }
-
   private restore(): void {
-    this.state = fromHash(location.hash, this.initial, this.names);
+    this.state = fromHash(readAddress(), this.initial, this.names);
     this.rebuild();
   }
 
@@ -102,9 +110,7 @@ export class Viewer {
   private remember(): void {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
-      const text = toHash(this.state, this.initial);
-      if (!text && !location.hash.includes("=")) return;
-      history.replaceState(null, "", text ? `#${text}` : location.pathname + location.search);
+      writeAddress(toHash(this.state, this.initial));
     }, 150);
   }
 
@@ -127,7 +133,7 @@ export class Viewer {
           h("span", {}, one.word), one.reason && h("small", {}, one.reason)))) : [];
     this.stage.replaceChildren(...this.panes.map((pane) => pane.element), ...missing);
     this.places = this.panes.length + missing.length;
-    this.notice.textContent = this.problem();
+    this.notice.textContent = problemOf(this.state, this.images, this.rays.length > 0);
     this.controls.show(this.state, this.rays.length > 0);
     this.layout();
     clearInterval(this.blinking);
@@ -139,9 +145,6 @@ export class Viewer {
       }, BLINK);
     }
   }
-
-  private blinking = 0;
-  private places = 1; // panes, and those that say why there is none
 
   /** The names of the pictures that have a pane of their own. */
   private subjects(): string[] {
@@ -160,34 +163,21 @@ export class Viewer {
     return one?.width === two?.width && one?.height === two?.height;
   }
 
-  private problem(): string {
-    const { mode, a, b } = this.state;
-    if (!this.names.length && mode !== "rays") return "No renderer delivered a picture.";
-    if (mode === "rays" && !this.rays.length) return "No rays were measured in this case.";
-    if (BARE[mode] || mode === "a" || mode === "b") return "";
-    const [one, two] = [this.images.get(a), this.images.get(b)];
-    if (one && two && !this.fits(a)) {
-      return `Sizes differ: ${a} is ${one.width} × ${one.height}, ` +
-        `${b} is ${two.width} × ${two.height}. There is nothing to compare pixel by pixel.`;
-    }
-    if (a === b && !(MAPS[mode] && this.state.every)) return "A and B are the same picture.";
-    return "";
-  }
-
   private name(text: string): HTMLElement {
     return h("span", { class: `renderer ${this.data.colours[text.split(": ").pop() ?? ""] ?? "c7"}` },
       h("i", { class: "dot", "aria-hidden": "true" }), text);
   }
 
   private layersOf(subject: string): { layers: Layer[]; image: { width: number; height: number } } {
-    const { mode, b } = this.state;
+    const { mode, b, exposure, encoding } = this.state;
+    const picture = (image: Image): Sheet => this.sheets.picture(image, exposure, encoding);
     if (mode === "rays") {
       const rays = this.rays.find((r) => r.errors.has(subject));
       const step = rays?.probe.errorStep ?? 1;
       const width = Math.ceil((rays?.probe.width ?? 1) / step);
       const height = Math.ceil((rays?.probe.height ?? 1) / step);
       const figures = rays?.errors.get(subject) ?? new Float32Array(1);
-      const sheet = this.figureSheet(`rays ${subject}`, figures, width, height);
+      const sheet = this.sheets.figures(`rays ${subject}`, figures, width, height, this.scale() as Scale);
       return { layers: [{ sheet, from: 0 }], image: { width: width * step, height: height * step } };
     }
     const map = MAPS[mode];
@@ -195,20 +185,21 @@ export class Viewer {
     if (map) {
       if (!this.fits(subject)) return { layers: [], image };
       const figures = this.figures(mode, subject, b);
-      const sheet = this.figureSheet(`${mode} ${subject} ${b}`, figures, image.width, image.height);
+      const sheet = this.sheets.figures(`${mode} ${subject} ${b}`, figures, image.width, image.height,
+        this.scale() as Scale);
       return { layers: [{ sheet, from: 0 }], image };
     }
     const other = this.images.get(b) ?? image;
     const flip = mode === "b" || this.held || (mode === "blink" && this.showsB);
-    if (mode === "side") return { layers: [{ sheet: this.pictureSheet(image), from: 0 }], image };
+    if (mode === "side") return { layers: [{ sheet: picture(image), from: 0 }], image };
     if (mode === "swipe") {
       return { layers: [
-        { sheet: this.pictureSheet(image), from: 0 },
-        { sheet: this.pictureSheet(other), from: this.swipe },
+        { sheet: picture(image), from: 0 },
+        { sheet: picture(other), from: this.swipe },
       ], image };
     }
     const shown = flip ? other : image;
-    return { layers: [{ sheet: this.pictureSheet(shown), from: 0 }], image: shown };
+    return { layers: [{ sheet: picture(shown), from: 0 }], image: shown };
   }
 
   private figures(mode: Mode, a: string, b: string): Float32Array {
@@ -222,36 +213,6 @@ export class Viewer {
     return found;
   }
 
-  private sheet(id: string, key: string, width: number, height: number,
-    shade: (out: Uint8ClampedArray) => void, text: Sheet["text"]): Sheet {
-    const known = this.sheets.get(id);
-    if (known?.key === key) return known.sheet;
-    const canvas = known?.sheet.canvas ?? h("canvas", { width, height });
-    const context = canvas.getContext("2d");
-    const pixels = new ImageData(width, height);
-    shade(pixels.data);
-    context?.putImageData(pixels, 0, 0);
-    const sheet = { canvas, text };
-    this.sheets.set(id, { key, sheet });
-    return sheet;
-  }
-
-  private pictureSheet(image: Image): Sheet {
-    const { exposure, encoding } = this.state;
-    const count = image.width * image.height;
-    return this.sheet(`picture ${image.name}`, `${exposure} ${encoding}`, image.width, image.height,
-      (out) => shadeRadiance(image.planes, exposure, encoding, out),
-      (x, y) => [0, 1, 2].map((c) =>
-        number(image.planes[c * count + y * image.width + x] as number, 3)));
-  }
-
-  private figureSheet(id: string, figures: Float32Array, width: number, height: number): Sheet {
-    const scale = this.scale() as Scale;
-    return this.sheet(id, `${scale.low} ${scale.high}`, width, height,
-      (out) => shadeFigures(figures, scale, out),
-      (x, y) => [number(figures[y * width + x] as number, 3)]);
-  }
-
   private scale(): Scale | null {
     return MAPS[this.state.mode]?.scale(this.state.exposure) ?? null;
   }
@@ -262,12 +223,7 @@ export class Viewer {
     const shape = this.shape();
     const { columns, room } = arranged(this.places, this.stage.clientWidth, shape);
     this.stage.style.setProperty("--panes", String(columns));
-    this.subjects().forEach((subject, k) => {
-      const { layers, image } = this.layersOf(subject);
-      const pane = this.panes[k];
-      pane?.show(this.paneLabel(subject), this.caption(subject), layers, image.width, image.height);
-      pane?.fit(room);
-    });
+    this.eachPane((pane) => pane.fit(room));
     this.refresh();
   }
 
@@ -283,20 +239,19 @@ export class Viewer {
     this.scheduled = true;
     requestAnimationFrame(() => {
       this.scheduled = false;
-      this.subjects().forEach((subject, k) => {
-        const { layers, image } = this.layersOf(subject);
-        const pane = this.panes[k];
-        pane?.show(this.paneLabel(subject), this.caption(subject), layers, image.width, image.height);
-        pane?.draw(this.state.camera, this.state.pins, this.hovered);
-      });
+      this.eachPane((pane) => pane.draw(this.state.camera, this.state.pins, this.hovered));
     });
   }
 
-  private paneLabel(subject: string): string {
-    const { mode, b } = this.state;
-    if (mode === "rays") return `Ray error of ${subject}`;
-    if (MAPS[mode]) return `${MAPS[mode].title} of A ${subject} and B ${b}`;
-    return mode === "swipe" || mode === "blink" ? `${subject} and ${b}` : subject;
+  /** Gives every pane what it shows now, then does `then` with it. */
+  private eachPane(then: (pane: Pane) => void): void {
+    this.subjects().forEach((subject, k) => {
+      const pane = this.panes[k];
+      if (!pane) return;
+      const { layers, image } = this.layersOf(subject);
+      pane.show(paneLabel(this.state, subject), this.caption(subject), layers, image.width, image.height);
+      then(pane);
+    });
   }
 
   private caption(subject: string): (Node | string)[] {
@@ -416,63 +371,9 @@ export class Viewer {
     } });
   }
 
-  private setMode(mode: Mode): void {
-    this.update({ mode: this.state.mode === mode ? "side" : mode });
-  }
-
-  private step(which: "a" | "b", by: number): void {
-    const at = this.names.indexOf(this.state[which]);
-    const next = this.names[(at + by + this.names.length) % this.names.length];
-    if (next !== undefined) this.choose(which, next);
-  }
-
   private choose(which: "a" | "b", name: string): void {
     const shows = this.state.mode === "side" ? { mode: which as Mode } : {};
     this.update({ [which]: name, ...shows });
-  }
-
-  private bindKeys(): void {
-    const group = "Pictures";
-    const nth = (event: KeyboardEvent): void => {
-      const name = this.names[Number(event.code.slice(-1)) - 1];
-      if (name !== undefined) this.choose(event.shiftKey ? "b" : "a", name);
-    };
-    bind(group, "1 … 9", "picture A", ["Digit"], nth);
-    bind(group, "Shift 1 … 9", "picture B, the reference", [], nth);
-    bind(group, "← →", "previous, next picture A; with Shift B", ["ArrowLeft", "ArrowRight"], (e) =>
-      this.step(e.shiftKey ? "b" : "a", e.key === "ArrowLeft" ? -1 : 1));
-    bind(group, "↑ ↓", "previous, next mode, where the viewer has the focus", ["ArrowUp", "ArrowDown"],
-      (e) => {
-        if (!this.element.contains(document.activeElement)) {
-          scrollBy({ top: e.key === "ArrowUp" ? -80 : 80 });
-          return;
-        }
-        const modes = MODE_NAMES.filter((m) => m !== "rays" || this.rays.length);
-        const at = modes.indexOf(this.state.mode) + (e.key === "ArrowUp" ? -1 : 1);
-        this.update({ mode: modes[(at + modes.length) % modes.length] as Mode });
-      });
-    for (const mode of MODE_NAMES) {
-      if (MODES[mode].key) {
-        bind(group, MODES[mode].key, `${MODES[mode].label}: ${MODES[mode].hint}`, [MODES[mode].key],
-          () => this.setMode(mode));
-      }
-    }
-    bind(group, "Shift", "hold: B in place of A", ["Shift"], () => this.hold(true));
-    addEventListener("keyup", (event) => event.key === "Shift" && this.hold(false));
-    addEventListener("blur", () => this.hold(false));
-    bind(group, "m", "maps of A alone, or of every picture against B", ["m"], () =>
-      this.update({ every: !this.state.every }));
-    bind(group, "e E", "exposure up, down by half a stop; in maps the end of the scale", ["e", "E"], (e) =>
-      this.update({ exposure: this.state.exposure + (e.key === "E" ? -0.5 : 0.5) }));
-    bind(group, "g", "sRGB or gamma 2.2", ["g"], () => this.update({
-      encoding: (this.state.encoding === "srgb" ? "gamma" : "srgb") as Encoding }));
-    bind(group, "r", "reset exposure and encoding", ["r"], () =>
-      this.update({ exposure: 0, encoding: "srgb" }));
-    bind(group, "+ −", "zoom in, out", ["+", "=", "-"], (e) => this.zoom(e.key === "-" ? 0.5 : 2));
-    bind(group, "0", "one pixel per pixel", ["0"], () =>
-      this.update({ camera: { ...this.current(this.panes[0]), scale: 1 } }));
-    bind(group, "f", "fit", ["f"], () => this.update({ camera: null }));
-    bind(group, "Esc", "take all pins away", ["Escape"], () => this.unpin());
   }
 
   private hold(down: boolean): void {
@@ -480,18 +381,4 @@ export class Viewer {
     this.held = down;
     this.schedule();
   }
-}
-
-/** As many columns as make the panes largest, and the height that each may have. */
-function arranged(panes: number, width: number, shape: number): { columns: number; room: number } {
-  const height = Math.max(300, Math.min(innerHeight, 1200) * 0.72);
-  let best = { columns: 1, room: height };
-  let widest = 0;
-  for (let columns = 1; columns <= Math.min(panes, 4); columns++) {
-    const rows = Math.ceil(panes / columns);
-    const room = height / rows - 40;
-    const side = Math.min(width / columns - 10, room / shape);
-    if (side > widest * 1.02) [widest, best] = [side, { columns, room }];
-  }
-  return best;
 }
