@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references findings test fuzz lint format lock ui bench clean
+.PHONY: help setup suite catalogue references findings test fuzz lint stress format lock ui bench clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -35,6 +35,10 @@ lint: setup ## Check style and types
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/mypy
+
+stress: setup ## Make faults on purpose, many of each, and write docs/reliability.md
+	@SNELLCHECK_STRESS=reports/stress $(BIN)/python -m pytest -q tests/stress
+	@$(BIN)/python scripts/reliability reports/stress
 
 format: setup ## Mend what of the style can be mended by a program
 	@$(BIN)/ruff check --fix --quiet

@@ -86,10 +86,14 @@ class ImageNotFinite(RendererFailed):
     """An image holds NaN or infinity: ERROR. `pixels` are where, row by row from the top left."""
 
     def __init__(self, pixels: Iterable[int], *, width: int, log: str = "") -> None:
-        self.pixels = tuple(pixels)
+        self.pixels, self.width = tuple(pixels), width
         y, x = divmod(self.pixels[0], width)
         message = f"wrote NaN or infinity in {len(self.pixels)} pixels, first at ({x}, {y})"
         super().__init__(message, log=log)
+
+
+class ConnectionLost(SnellcheckError):
+    """The machines that do the work cannot be reached any more: nothing can go on."""
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:

@@ -20,7 +20,7 @@ from functools import partial
 
 from harness.cache.cache import Cache
 from harness.camera import primary_rays
-from harness.errors import RendererError, RendererFailed, RendererMissing
+from harness.errors import ConnectionLost, RendererError, RendererFailed, RendererMissing
 from harness.memo import Memo, memo_of
 from harness.plan import Job
 from harness.preflight import Render, preflight
@@ -60,9 +60,12 @@ class Done:
 
 @dataclass(frozen=True)
 class Halted:
-    """Nothing can go on, for a reason that is no renderer's fault: the disk is full."""
+    """Nothing can go on, for a reason that is no renderer's fault.
 
-    error: OSError
+    The disk is full (OSError), or a cluster cannot be reached.
+    """
+
+    error: OSError | ConnectionLost
 
 
 Event = Calibrated | Done | Halted
@@ -118,7 +121,7 @@ class Lane:
     def _reporting(self, work: Callable[[], Event]) -> None:
         try:
             self.around.events.put(work())
-        except OSError as error:
+        except (OSError, ConnectionLost) as error:
             self.around.events.put(Halted(error))
 
     def _calibrate(self) -> Calibrated:
@@ -130,6 +133,8 @@ class Lane:
             contender = calibrate(self.renderer, self.settings, self._render)
             if contender.absent is Verdict.SKIP:
                 remedy = self.renderer.health().remedy
+        except ConnectionLost:
+            raise
         except ANYTHING as error:
             reason = f"failed: {_described(error)}"
             contender = _out(self.renderer.name, Verdict.ERROR, reason)
@@ -178,6 +183,8 @@ def _performed(renderer: Renderer, job: Job) -> Result:
         return renderer.trace(job.scene, primary_rays(job.scene), job.path, job.settings)
     except RendererError as error:
         return error
+    except ConnectionLost:
+        raise
     except ANYTHING as error:
         return RendererFailed(_described(error))
 

@@ -17,7 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.errors import RendererError, RendererFailed, RendererMissing, RendererUnsupported
+from harness.errors import (
+    ImageNotFinite,
+    RendererError,
+    RendererFailed,
+    RendererMissing,
+    RendererUnsupported,
+)
 from harness.plan import Job
 from harness.preflight import Preflight
 from harness.record import Verdict
@@ -67,6 +73,9 @@ def job_key(job: Job, fingerprint: str) -> str:
 
 def pack_result(result: Result) -> Parcel:
     """The parcel of an image, of ray paths, or of the error that stands in their place."""
+    if isinstance(result, ImageNotFinite):
+        where = {"pixels": list(result.pixels), "width": result.width}
+        return Parcel({"kind": "not finite", "log": result.log, **where}, {})
     if isinstance(result, RendererError):
         kind = next(name for name, error in _ERRORS.items() if isinstance(result, error))
         return Parcel({"kind": kind, "message": str(result), "log": result.log}, {})
@@ -88,6 +97,8 @@ def pack_result(result: Result) -> Parcel:
 def unpack_result(parcel: Parcel) -> Result:
     """The result that `pack_result` was given, bit for bit."""
     meta = parcel.meta
+    if meta["kind"] == "not finite":
+        return ImageNotFinite(meta["pixels"], width=meta["width"], log=meta["log"])
     if meta["kind"] in _ERRORS:
         return _ERRORS[meta["kind"]](meta["message"], log=meta["log"])
     arrays: dict[str, Any] = {

@@ -123,6 +123,7 @@ def _summary(
     ]
     caches = {id(c): c for c in (session.storage.lasting, session.storage.passing) if c}
     damaged = sum(cache.damaged for cache in caches.values())
+    retried = sum(getattr(lane.renderer, "retried", 0) for lane in session.lanes.values())
     return Summary(
         snellcheck_version=__version__,
         started=session.started,
@@ -136,7 +137,7 @@ def _summary(
         diagnoses=explain_run(
             [state.case for state in session.states], cases, {c.name: c.reason for c in contenders}
         ),
-        effort=session.effort.model_copy(update={"damaged": damaged}),
+        effort=session.effort.model_copy(update={"damaged": damaged, "retried": retried}),
         interrupted=interrupted,
     )
 

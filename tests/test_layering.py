@@ -41,9 +41,10 @@ LAYERS = (
     ("report",),
     ("plan", "results", "probed", "pairs", "explain", "spectral", "judge"),
     ("baseline", "packing", "archive"),
-    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "run"),
+    ("parcel", "memo", "bundle", "lanes", "session", "shard", "merge", "remote", "cluster", "run"),
+    ("revision", "history", "bisect", "bisect_case"),
     ("doctor", "ci"),
-    ("show", "cli", "pytest_plugin"),
+    ("show", "show_history", "cli", "pytest_plugin"),
 )
 LAYER = {stage: depth for depth, stages in enumerate(LAYERS) for stage in stages}
 
@@ -63,7 +64,10 @@ WORKER_ONLY = TRACER_ADAPTERS | {
 # What makes `snellcheck --help` slow, or can abort the process, is imported where it is used.
 HEAVY = {
     "colour",
+    "dask",
+    "distributed",
     "drjit",
+    "fsspec",
     "imagecodecs",
     "imageio",
     "matplotlib",

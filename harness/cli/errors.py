@@ -27,14 +27,14 @@ def reports_errors(command: Command) -> Command:
 
     @wraps(command)
     def wrapped(*args: object, **kwargs: object) -> object:
-        from harness.errors import InputError, RendererError
+        from harness.errors import InputError, SnellcheckError
 
         try:
             return command(*args, **kwargs)
         except InputError as error:
             click.secho(str(error), fg="red", err=True)
             sys.exit(EXIT_BAD_INPUT)
-        except RendererError as error:
+        except SnellcheckError as error:
             click.secho(str(error), fg="red", err=True)
             sys.exit(EXIT_COULD_NOT_RUN)
         except KeyboardInterrupt:

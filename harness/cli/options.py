@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from harness.plan import PreparedCase
+    from harness.record import Summary
     from harness.renderers.base import Renderer
     from harness.scene.load import LoadedCase
 
@@ -41,6 +42,21 @@ cache_option = click.option(
     "--cache", "cache_at", metavar="DIR|URL", default="", envvar="SNELLCHECK_RESULTS",
     help="Where results are kept from run to run.  [default: the user's cache folder]",
 )  # fmt: skip
+
+history_option = click.option(
+    "--history/--no-history", "history", default=True, show_default=True,
+    help="Add the figures to the history of past runs.",
+)  # fmt: skip
+
+
+def add_to_history(summary: Summary, out: Path) -> None:
+    """Adds a run to the user's history, or says why it could not."""
+    from harness.history import History, history_file
+    from harness.revision import revision
+
+    trouble = History(history_file()).add(summary, revision(Path.cwd()), out)
+    if trouble:
+        click.secho(f"warning: {trouble}", fg="yellow", err=True)
 
 
 def loaded_cases(

@@ -74,7 +74,7 @@ class _Report:
         self.colours = colour_classes(self.renderers)
         self.trends = Trends(self.renderers, self.colours)
         self.stray: list[str] = []  # record files that belong to no case of the summary
-        self.environment = _environment()
+        self.environment = environment()
         self.absent = {name for name, known in summary.renderers.items() if known.status != "ok"}
         self.row_template = self.environment.get_template("row.html.j2")
         self.environment.globals.update(
@@ -251,7 +251,7 @@ def _pages(folder: Path) -> Iterator[Path]:
                 yield path
 
 
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
     import jinja2  # here, because the command line imports this module's package
 
     environment = jinja2.Environment(

@@ -11,7 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from harness.errors import RendererError, RendererFailed, RendererMissing, RendererUnsupported
+from harness.errors import (
+    ImageNotFinite,
+    RendererError,
+    RendererFailed,
+    RendererMissing,
+    RendererUnsupported,
+)
 from harness.parcel import (
     Parcel,
     job_key,
@@ -80,6 +86,13 @@ def test_errors(kind: type[RendererError]) -> None:
     back = unpack_result(through_json(pack_result(kind("why", log="line\nline"))))
     assert type(back) is kind
     assert (str(back), back.log) == ("why", "line\nline")
+
+
+def test_an_image_that_is_not_finite_keeps_where() -> None:
+    back = unpack_result(through_json(pack_result(ImageNotFinite([7, 9], width=4, log="x"))))
+    assert isinstance(back, ImageNotFinite)
+    assert (back.pixels, back.width, back.log) == ((7, 9), 4, "x")
+    assert str(back) == str(ImageNotFinite([7, 9], width=4))
 
 
 @pytest.mark.parametrize("case", prepared(), ids=lambda case: case.loaded.id)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -10,10 +11,12 @@ import click
 from harness.cli.errors import reports_errors
 from harness.cli.options import (
     DEFAULT_OUT,
+    add_to_history,
     cache_option,
     chosen_renderers,
     command_option,
     config_option,
+    history_option,
     named_by,
     prepared_cases,
     quality_option,
@@ -65,6 +68,13 @@ from harness.cli.shards import divided
     help="The times.json of an earlier run, to balance shards by.  [default: times.json in the "
     "folder of scenes]",
 )
+@click.option(
+    "--cluster",
+    "cluster_at",
+    metavar="URL|local:N",
+    help="Render on the workers of a Dask scheduler, tcp://HOST:PORT, or on N of our own.",
+)
+@history_option
 @reports_errors
 def command(
     case: tuple[str, ...],
@@ -84,6 +94,8 @@ def command(
     fresh: bool,
     shard: str | None,
     times: Path | None,
+    cluster_at: str | None,
+    history: bool,
 ) -> None:
     """Render CASEs (all of them, or those a glob like "slab-*" selects) and judge them.
 
@@ -91,45 +103,45 @@ def command(
     earlier run is taken from the cache. After an interruption, even by kill -9, the same command
     goes on where it stood.
     """
-    import shutil
-
     from harness import show
     from harness.baseline.stand_in import StandIns
     from harness.cache.cache import open_cache
     from harness.cli.baselines import stand_in_sources
     from harness.cli.interrupts import terminable
+    from harness.cli.places import places
     from harness.cores import core_count
-    from harness.renderers import registry
     from harness.report import write_report
-    from harness.run import HELPER, UNFINISHED
+    from harness.run import UNFINISHED
     from harness.run import run as run_cases
     from harness.shard import NOTE, write_note
 
-    chosen = chosen_renderers(renderers, commands, configs)
-    cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
-    if not renderers:
-        chosen += named_by(cases)
-    helper = next((r for r in chosen if r.name == HELPER), None) or registry.create(HELPER)
-    note = None
-    if shard is not None:
-        settings = f"{quality}, seed {seed}, stored {stored}"
-        cases, note = divided(shard, cases, [r.name for r in chosen], settings, times, scenes)
-    line = " ".join(["snellcheck", *sys.argv[1:]])
-    cache = None if no_cache else open_cache(cache_at)
-    if fresh:
-        shutil.rmtree(out / UNFINISHED, ignore_errors=True)
-    (out / NOTE).unlink(missing_ok=True)
-    with show.progress() as progress, terminable():
-        summary = run_cases(
-            cases, chosen, helper, out, quality=quality, threads=jobs or core_count(), seed=seed,
-            timeout_s=timeout, memory_mb=memory, command=line, report=progress, cache=cache,
-            must_run=renderers,
-            stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
-        )  # fmt: skip
+    cache, note = None if no_cache else open_cache(cache_at), None
+    with show.progress() as progress, places(cluster_at) as place:
+        chosen = chosen_renderers(renderers, commands, configs)
+        cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
+        if not renderers:
+            chosen += named_by(cases)
+        if shard is not None:
+            settings = f"{quality}, seed {seed}, stored {stored}"
+            cases, note = divided(shard, cases, [r.name for r in chosen], settings, times, scenes)
+        if fresh:
+            shutil.rmtree(out / UNFINISHED, ignore_errors=True)
+        (out / NOTE).unlink(missing_ok=True)
+        chosen, helper = place.put(chosen, commands, configs)
+        with terminable():
+            summary = run_cases(
+                cases, chosen, helper, out, quality=quality, seed=seed,
+                threads=place.threads(jobs or core_count()), timeout_s=timeout, memory_mb=memory,
+                report=progress, cache=cache,
+                command=" ".join(["snellcheck", *sys.argv[1:]]), must_run=renderers,
+                stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
+            )  # fmt: skip
     if cache is not None and cache.trouble:
         click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)
     if note is not None:
         write_note(out, note)
+    if history and not summary.interrupted:
+        add_to_history(summary, out)
     index = write_report(out)
     show.verdicts(summary, index)
     sys.exit(summary.exit_code)

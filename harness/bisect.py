@@ -1,0 +1,148 @@
+"""Which commit broke a check: git's bisection, with a run of one case at each step.
+
+It works in a worktree of its own, so that the user's files, index and branch stay as they are.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import shlex
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from harness.errors import InputError
+from harness.revision import git
+
+
+class Answer(StrEnum):
+    """What a step is to git: `SKIP` where the commit cannot be tried."""
+
+    GOOD = "good"
+    BAD = "bad"
+    SKIP = "skip"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A commit that was tried."""
+
+    commit: str
+    subject: str
+    answer: Answer
+    why: str
+
+
+@dataclass(frozen=True)
+class Culprit:
+    """The first bad commit; several where the commits between could not be tried."""
+
+    commits: tuple[str, ...]
+    text: str
+
+
+Try = Callable[[Path], tuple[Answer, str]]
+
+
+def bisect(
+    repository: Path, good: str, bad: str, attempt: Try, report: Callable[[Step], None]
+) -> Culprit:
+    """The first commit between `good` and `bad` at which `attempt`, given its files, says BAD.
+
+    Both ends are tried first: where `good` is not good or `bad` not bad there is nothing to find,
+    which is an InputError, as are revisions that git does not know.
+    """
+    root = git(repository, "rev-parse", "--show-toplevel")
+    if root is None:
+        raise InputError.of("no git repository", value=str(repository))
+    named = {"--good": good, "--bad": bad}
+    ends = {key: _commit(Path(root), key, name) for key, name in named.items()}
+    with _worktree(Path(root), ends["--bad"]) as tree:
+        for key, wanted in (("--bad", Answer.BAD), ("--good", Answer.GOOD)):
+            step = _step(tree, ends[key], attempt)
+            report(step)
+            if step.answer is not wanted:
+                told = f"{step.answer}: {step.why}"
+                raise InputError.of("this end is not what it is said to be", key=key, value=told)
+        said = _git(tree, "bisect", "start", ends["--bad"], ends["--good"])
+        while (found := _culprit(tree, said)) is None:
+            step = _step(tree, "", attempt)
+            report(step)
+            said = _git(tree, "bisect", str(step.answer), may_fail=True)
+    return found
+
+
+def run_of(command: str, verdict: Callable[[Path], tuple[Answer, str]]) -> Try:
+    """Tries a commit by `command`, run without a shell in its folder, and then by `verdict`.
+
+    A commit that cannot be built is skipped.
+    """
+    words = shlex.split(command)
+
+    def attempt(tree: Path) -> tuple[Answer, str]:
+        if words:
+            try:
+                done = subprocess.run(words, cwd=tree, capture_output=True, text=True, check=False)
+            except OSError as error:
+                raise InputError.of(str(error.strerror), key="--build", value=command) from error
+            if done.returncode != 0:
+                last = (done.stderr or done.stdout).strip().splitlines()[-1:]
+                return Answer.SKIP, " ".join(["it cannot be built:", *last])
+        return verdict(tree)
+
+    return attempt
+
+
+def _step(tree: Path, commit: str, attempt: Try) -> Step:
+    if commit:
+        _git(tree, "checkout", "--quiet", "--detach", commit)
+    name = _git(tree, "rev-parse", "HEAD")
+    subject = _git(tree, "log", "-1", "--format=%s")
+    answer, why = attempt(tree)
+    # What a build has changed would keep git from checking out the next commit.
+    _git(tree, "reset", "--quiet", "--hard")
+    return Step(name, subject, answer, why)
+
+
+def _culprit(tree: Path, said: str) -> Culprit | None:
+    """The end of the search, as git says it."""
+    if "is the first bad commit" in said:
+        commit = said.split()[0]
+        shown = _git(tree, "log", "-1", "--format=%h %an, %as: %s", commit)
+        return Culprit((commit,), shown)
+    if "first bad commit could be any of" in said:
+        lines = said.splitlines()
+        commits = tuple(line for line in lines if len(line) == 40 and line.isalnum())
+        return Culprit(commits, "one of: " + ", ".join(commit[:10] for commit in commits))
+    return None
+
+
+@contextlib.contextmanager
+def _worktree(root: Path, commit: str) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="snellcheck-") as folder:
+        tree = Path(folder) / "tree"
+        _git(root, "worktree", "add", "--quiet", "--detach", str(tree), commit)
+        try:
+            yield tree
+        finally:
+            git(root, "worktree", "remove", "--force", str(tree))
+
+
+def _commit(root: Path, key: str, name: str) -> str:
+    found = git(root, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
+    if not found:
+        raise InputError.of("git knows no such commit", key=key, value=name)
+    return found.splitlines()[-1]
+
+
+def _git(folder: Path, *arguments: str, may_fail: bool = False) -> str:
+    """What git prints. Raises InputError with what it says where it fails."""
+    done = subprocess.run(
+        ["git", "-C", str(folder), *arguments], capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0 and not may_fail:
+        raise InputError.of(f"git {arguments[0]} failed: {done.stderr.strip()}", value=str(folder))
+    return (done.stdout + (done.stderr if may_fail else "")).strip()

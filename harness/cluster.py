@@ -1,0 +1,76 @@
+"""Dask distributed as the carrier of jobs: a scheduler somewhere, or workers on this machine."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from harness.errors import ConnectionLost, InputError
+from harness.remote import Origin, RemoteRenderer
+
+INSTALL = "pip install 'snellcheck[cluster]'"
+CONNECT_S = 10.0
+# A worker that has a job and one that waits for it never idles.
+UNDER_WAY = 2
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A connected client of a scheduler."""
+
+    client: Any
+    where: str
+
+    @property
+    def cores(self) -> int:
+        """Threads of all workers that are there now, at least one."""
+        return max(1, sum(int(count) for count in self.client.nthreads().values()))
+
+    def renderer(self, name: str, origin: Origin) -> RemoteRenderer:
+        """The renderer `name` as it is over there."""
+        from distributed.scheduler import KilledWorker
+
+        executor: concurrent.futures.Executor = self.client.get_executor(pure=False)
+        return RemoteRenderer(
+            name, origin, executor, concurrency=UNDER_WAY * self.cores,
+            lost=(KilledWorker, concurrent.futures.CancelledError),
+            gone=lambda: self.client.status not in ("running", "connecting"),
+        )  # fmt: skip
+
+
+@contextlib.contextmanager
+def connected(text: str) -> Iterator[Cluster]:
+    """The cluster at ``tcp://…``, or ``local:N``, N worker processes on this machine.
+
+    Raises InputError where `text` is neither or Dask is not installed, ConnectionLost where
+    nobody answers.
+    """
+    local = re.fullmatch(r"local:([1-9]\d{0,2})", text)
+    if local is None and not re.match(r"(tcp|tls|ws|wss)://.", text):
+        expected = "tcp://HOST:PORT of a Dask scheduler, or local:N"
+        raise InputError.of("no cluster", key="--cluster", value=text, expected=expected)
+    try:
+        import dask
+        import distributed
+    except ModuleNotFoundError:
+        raise InputError.of("a cluster needs Dask", key="--cluster", expected=INSTALL) from None
+    with contextlib.ExitStack() as stack:
+        address: Any = text
+        if local is not None:
+            # A lost worker is ours to notice and count, not Dask's to try again in silence.
+            stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
+            address = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=int(local[1]), threads_per_worker=1, processes=True,
+                    dashboard_address=None,
+                )
+            )  # fmt: skip
+        try:
+            client = stack.enter_context(distributed.Client(address, timeout=CONNECT_S))
+        except OSError as error:
+            raise ConnectionLost(f"no scheduler answers at {text}: {error}") from error
+        yield Cluster(client, text)
