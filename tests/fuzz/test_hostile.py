@@ -110,6 +110,7 @@ def watched(work: Path, *arguments: str) -> tuple[subprocess.CompletedProcess[st
     environment = os.environ | {
         "HOME": str(work / "home"), "TMPDIR": str(work / "tmp"), "PYTHONPATH": str(ROOT),
         "SNELLCHECK_CACHE": str(work / "cache"), "XDG_CACHE_HOME": str(work / "cache"),
+        "SNELLCHECK_HISTORY": str(work / "history.sqlite"),
     }  # fmt: skip
     done = subprocess.run(
         [sys.executable, "-c", WATCHED, str(log), *arguments], cwd=work, env=environment,
