@@ -169,7 +169,7 @@ EDITS = {
     ),
     "missing table": (
         '[camera]\ntype = "perspective"\norigin = [0, 0, 6]\ntarget = [0, 0, 0]\nfov_x = 30', "",
-        1, "camera", "missing", None, "a table of type orthographic or perspective", None,
+        1, "camera", "missing", None, "a table of type orthographic, perspective or thin_lens", None,
     ),
     "missing type": (
         'type = "sphere", ', "",
@@ -184,7 +184,7 @@ EDITS = {
     "unknown material": (
         '"emissive"', '"emisive"',
         23, "surfaces[0].material.type", "unknown type", '"emisive"',
-        "diffuse, emissive, mirror, thin_slab or translucent", "emissive",
+        "diffuse, emissive, mirror, phong, thin_slab or translucent", "emissive",
     ),
     "unknown pattern": (
         '"constant"', '"chequer"',
@@ -193,7 +193,7 @@ EDITS = {
     ),
     "unknown camera": (
         '"perspective"', '"fisheye"',
-        7, "camera.type", "unknown type", '"fisheye"', "orthographic or perspective", None,
+        7, "camera.type", "unknown type", '"fisheye"', "orthographic, perspective or thin_lens", None,
     ),
     "unknown format": (
         "format = 1", "format = 2", 1, "format", "unknown format", "2", "1", None,
