@@ -169,7 +169,8 @@ EDITS = {
     ),
     "missing table": (
         '[camera]\ntype = "perspective"\norigin = [0, 0, 6]\ntarget = [0, 0, 0]\nfov_x = 30', "",
-        1, "camera", "missing", None, "a table of type orthographic, perspective or thin_lens", None,
+        1, "camera", "missing", None,
+        "a table of type orthographic, perspective or thin_lens", None,
     ),
     "missing type": (
         'type = "sphere", ', "",
@@ -193,7 +194,8 @@ EDITS = {
     ),
     "unknown camera": (
         '"perspective"', '"fisheye"',
-        7, "camera.type", "unknown type", '"fisheye"', "orthographic, perspective or thin_lens", None,
+        7, "camera.type", "unknown type", '"fisheye"',
+        "orthographic, perspective or thin_lens", None,
     ),
     "unknown format": (
         "format = 1", "format = 2", 1, "format", "unknown format", "2", "1", None,
