@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references findings test lint stress format lock ui bench clean
+.PHONY: help setup suite catalogue references findings test fuzz lint stress format lock ui bench clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -30,6 +30,9 @@ detection: setup ## Measure what is seen of wrong renderers, and write docs/dete
 
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2
+
+fuzz: setup ## Read 27,000 malformed files, and note what came of them for `make stress`
+	@SNELLCHECK_STRESS=reports/stress $(BIN)/python -m pytest -q -n 2 tests/fuzz
 
 lint: setup ## Check style and types
 	@$(BIN)/ruff check --quiet

@@ -65,7 +65,7 @@ def parse(data: bytes, kind: type[Document], path: Path, what: str = "record") -
         return kind.model_validate_json(data)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
-        key = ".".join(str(part) for part in first["loc"])
+        key = ".".join(str(part) or '""' for part in first["loc"])
         position = re.search(r"at line (\d+) column \d+", first["msg"])
         raise InputError.of(
             f"not a valid {what}: {escaped(first['msg'])[:LONGEST_MESSAGE]}",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,7 +59,7 @@ class StoredImage(Model):
     @field_validator("file")
     @classmethod
     def _beside(cls, name: str) -> str:
-        if name and (Path(name).name != name or name.startswith(".") or "\\" in name):
+        if name and not re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,200}", name):
             raise ValueError("not the name of a file beside the baseline")
         return name
 

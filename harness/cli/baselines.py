@@ -69,13 +69,16 @@ def show_states(summary: Summary, console: Console | None = None) -> None:
     lines = [line for line in lines if line[0] is not BaselineState.NEW]
     lines.sort(key=lambda line: WORST_FIRST.index(line[0]))
     for state, name, reason in lines[:MOST_LINES]:
-        console.print(f"[{STYLE[state]}]{state.value}[/] {escape(name)}: {escape(reason)}")
+        console.print(
+            f"[{STYLE[state]}]{state.value}[/] {escape(name)}: {escape(reason)}", soft_wrap=True
+        )
     if len(lines) > MOST_LINES:
         console.print(f"… and {len(lines) - MOST_LINES} more; the report has them all")
     for trend in found.trends:
         console.print(
             f"[yellow]drifting[/] {escape(trend.case)} {escape(trend.check)}: "
-            f"{escape(trend.reason)} (p = {trend.p_value:.1g})"
+            f"{escape(trend.reason)} (p = {trend.p_value:.1g})",
+            soft_wrap=True,
         )
     if new:
         console.print(f"{len(new)} checks were never approved; `snellcheck approve` does that")
@@ -84,7 +87,9 @@ def show_states(summary: Summary, console: Console | None = None) -> None:
         for state in WORST_FIRST
         if state.value in found.counts
     )
-    console.print(f"Against {escape(found.source)}: {said or 'nothing to compare with'}")
+    console.print(
+        f"Against {escape(found.source)}: {said or 'nothing to compare with'}", soft_wrap=True
+    )
 
 
 def show_plans(plans: Sequence[Plan], console: Console | None = None) -> None:

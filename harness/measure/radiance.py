@@ -21,6 +21,7 @@ from harness.scene.resolved import (
     Checker,
     Constant,
     Diffuse,
+    DirectionalLight,
     Emissive,
     Orthographic,
     Pattern,
@@ -107,9 +108,13 @@ def _shade(scene: ResolvedScene, surface: Surface, point: Float) -> tuple[Float,
 
 
 def _irradiance(scene: ResolvedScene, face: Rectangle, point: Float) -> Float:
-    """I cos(theta) / r^2, summed over the lights in front of the face."""
+    """I cos(theta) / r^2 and, of light from far away, E cos(theta), of all lights in front."""
     total = np.zeros((len(point), 3))
     for light in scene.lights:
+        if isinstance(light, DirectionalLight):
+            slope = max(-float(np.dot(light.direction, face.frame.z)), 0.0)
+            total += slope * np.array(light.irradiance)
+            continue
         way = np.array(light.position) - point
         r2 = np.einsum("ij,ij->i", way, way)
         cos = np.maximum(way @ np.array(face.frame.z), 0) / np.sqrt(r2)

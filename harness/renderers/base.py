@@ -41,6 +41,9 @@ class Capability(enum.StrEnum):
     THIN_SLAB = "thin-slab"  # the lecture's thin face; others are given a real slab
     MIRROR = "mirror"
     DIFFUSE = "diffuse"  # with point lights
+    PHONG = "phong"  # diffuse with a highlight
+    DIRECTIONAL_LIGHT = "directional-light"
+    THIN_LENS = "thin-lens"  # cameras with depth of field, as the mean over the lens says
     TRANSLUCENT = "translucent"
     PICTURE = "picture"
     ABSORPTION = "absorption"

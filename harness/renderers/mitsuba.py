@@ -48,6 +48,7 @@ STOCK_CAPABILITIES = frozenset(
         Capability.SMOOTH_MESH,
         Capability.MIRROR,
         Capability.DIFFUSE,
+        Capability.DIRECTIONAL_LIGHT,
         Capability.TRANSLUCENT,
         Capability.PICTURE,
         Capability.ABSORPTION,

@@ -150,7 +150,7 @@ def _children(
 
 @dataclass(frozen=True)
 class Glow:
-    """Emitters where rays meet them, and point lights on what is diffuse."""
+    """Emitters where rays meet them, and point and directional lights on what is diffuse."""
 
     live: Any
     lights: list[Any]
@@ -158,8 +158,12 @@ class Glow:
 
     @classmethod
     def of(cls, live: Any, scene: rs.ResolvedScene) -> Glow:
-        delta = mi.EmitterFlags.DeltaPosition
-        lights = [light for light in live.emitters() if mi.has_flag(light.flags(), delta)]
+        lights = [
+            light
+            for light in live.emitters()
+            if mi.has_flag(light.flags(), mi.EmitterFlags.DeltaPosition)
+            or mi.has_flag(light.flags(), mi.EmitterFlags.DeltaDirection)
+        ]
         return cls(live, lights, Code.of(scene))
 
     def seen(self, tables: Tables, node: Any, si: Any, active: Any) -> Any:

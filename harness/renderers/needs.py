@@ -21,6 +21,7 @@ _SHAPES = {
 _MATERIALS = {
     resolved.Mirror: Capability.MIRROR,
     resolved.Diffuse: Capability.DIFFUSE,
+    resolved.Phong: Capability.PHONG,
     resolved.Translucent: Capability.TRANSLUCENT,
     resolved.ThinSlab: Capability.THIN_SLAB,
 }
@@ -71,8 +72,16 @@ def _all_reasons(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
             yield capability, place
         if _is_picture(surface.material):
             yield Capability.PICTURE, f"{place} shows a picture"
+    yield from _of_surroundings(scene)
+
+
+def _of_surroundings(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
     if any(scene.media[0].absorption):
         yield Capability.ABSORPTION, "the medium around everything absorbs"
+    if any(isinstance(light, resolved.DirectionalLight) for light in scene.lights):
+        yield Capability.DIRECTIONAL_LIGHT, "a light comes from far away"
+    if isinstance(scene.camera, resolved.ThinLens):
+        yield Capability.THIN_LENS, "the camera has a lens"
     if scene.camera.medium != 0:
         yield Capability.CAMERA_INSIDE, "the camera stands inside a solid"
 

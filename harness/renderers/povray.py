@@ -79,6 +79,8 @@ class PovRayRenderer:
             Capability.SMOOTH_MESH,
             Capability.MIRROR,
             Capability.DIFFUSE,
+            Capability.PHONG,
+            Capability.DIRECTIONAL_LIGHT,
             Capability.TRANSLUCENT,
             Capability.PICTURE,
             Capability.ABSORPTION,

@@ -15,6 +15,7 @@ DEEPEST = 32  # tables and arrays in each other
 TOO_DEEP = "nested too deeply"
 
 QUOTED = re.compile(rb'"(?:[^"\\\n]|\\.){0,200}"|' rb"'[^'\n]{0,200}'")
+LONG_NUMBER = re.compile(rb"[0-9_]{4301}")
 BARE_KEY = re.compile(rb"[ \t]*[A-Za-z0-9_-]+[ \t]*")
 
 
@@ -49,6 +50,9 @@ def parse_document(source: bytes, path: Path) -> dict[str, object]:
             message = f"{message[: position.start()]} in column {position[2]}"
         elif message.endswith(" (at end of document)"):
             line = source.count(b"\n") + 1
+        elif digits := LONG_NUMBER.search(source):  # Python converts none of more digits
+            message = "a number of thousands of digits"
+            line = source.count(b"\n", 0, digits.start()) + 1
         raise InputError.of(f"not valid TOML: {message}", file=path, line=line) from error
     try:
         count = count_values(document)

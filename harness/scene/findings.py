@@ -24,6 +24,7 @@ Result = TypeVar("Result")
 
 LONGEST_VALUE = 80  # characters of a value that a message quotes
 LONGEST_KEY = 200
+LONGEST_TEXT = 600
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,12 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
+
+
+def shown(text: str) -> str:
+    """The text as a message shows it; names in it may be of any length."""
+    text = printable(text)
+    return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
 
 
 def lines_of_keys(source: bytes) -> dict[KeyPath, int]:
@@ -177,13 +184,13 @@ def problems(findings: Iterable[Finding], file: Path, source: bytes | None) -> l
     lines = lines_of_keys(source) if source is not None else {}
     located = [
         Problem(
-            printable(finding.message),
+            shown(finding.message),
             file=file,
             line=_nearest_line(finding.path, lines),
             key=dotted(finding.path)[:LONGEST_KEY],
             value=finding.value,
-            expected=finding.expected and printable(finding.expected),
-            suggestion=finding.suggestion and printable(finding.suggestion),
+            expected=finding.expected and shown(finding.expected),
+            suggestion=finding.suggestion and shown(finding.suggestion),
         )
         for finding in findings
     ]

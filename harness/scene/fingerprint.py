@@ -10,6 +10,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
+
+from pydantic import BaseModel
 
 from harness.scene.resolved import ResolvedScene
 
@@ -19,10 +22,28 @@ NOTHING = 1e-13
 
 
 def fingerprint(scene: ResolvedScene) -> str:
-    """The SHA-256, in hex, of the scene with its floats to ten significant digits."""
-    rounded = json.loads(scene.model_dump_json(), parse_float=_rounded)
-    text = json.dumps(rounded, sort_keys=True, separators=(",", ":"))
+    """The SHA-256, in hex, of the scene with its floats to ten significant digits.
+
+    What has its default value is left out, so that a scene stays the same when the format learns
+    something new; but for the types of shapes, cameras, materials and patterns, which are defaults.
+    """
+    text = scene.model_dump_json(exclude_defaults=True)
+    rounded = json.loads(text, parse_float=_rounded)
+    content = {"scene": rounded, "types": list(_types(scene))}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _types(value: object) -> Iterator[str]:
+    """What tells variants of one thing apart, in the order of the document."""
+    if isinstance(value, BaseModel):
+        if isinstance(kind := getattr(value, "type", None), str):
+            yield kind
+        for name in type(value).model_fields:
+            yield from _types(getattr(value, name))
+    elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+        for part in value:
+            yield from _types(part)
 
 
 def _rounded(text: str) -> str:

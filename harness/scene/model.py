@@ -90,6 +90,15 @@ class Diffuse(Strict):
     reflectance: Reflectance
 
 
+class Phong(Strict):
+    """Diffuse, with a highlight of the light's colour around its mirror direction."""
+
+    type: Literal["phong"]
+    reflectance: Reflectance
+    specular: NonNegative
+    exponent: Annotated[float, Field(ge=1, le=1000, allow_inf_nan=False)]
+
+
 class Mirror(Strict):
     type: Literal["mirror"]
     reflectance: Reflectance = (1, 1, 1)
@@ -109,7 +118,7 @@ class ThinSlab(Strict):
 
 
 Material = Annotated[
-    Emissive | Diffuse | Mirror | Translucent | ThinSlab, Field(discriminator="type")
+    Emissive | Diffuse | Phong | Mirror | Translucent | ThinSlab, Field(discriminator="type")
 ]
 
 
@@ -137,6 +146,17 @@ class PointLight(Strict):
     intensity: Rgb
 
 
+class DirectionalLight(Strict):
+    """From far away, travelling along `direction`; `irradiance` is across it."""
+
+    type: Literal["directional"]
+    direction: Vec3
+    irradiance: Rgb
+
+
+Light = Annotated[PointLight | DirectionalLight, Field(discriminator="type")]
+
+
 class CameraBase(Strict):
     origin: Vec3
     target: Vec3
@@ -154,7 +174,22 @@ class OrthographicCamera(CameraBase):
     width: Positive
 
 
-Camera = Annotated[PerspectiveCamera | OrthographicCamera, Field(discriminator="type")]
+class ThinLensCamera(CameraBase):
+    """A lens of radius `aperture`: what is `focus` units ahead is sharp.
+
+    Each pixel is the mean through `lens_samples` squared points of the lens, evenly spread.
+    """
+
+    type: Literal["thin_lens"]
+    fov_x: Annotated[float, Field(gt=0, lt=180)]
+    aperture: Positive
+    focus: Positive
+    lens_samples: Annotated[int, Field(ge=1, le=64)] = 8
+
+
+Camera = Annotated[
+    PerspectiveCamera | OrthographicCamera | ThinLensCamera, Field(discriminator="type")
+]
 
 
 class Film(Strict):
@@ -266,7 +301,7 @@ class Case(Strict):
     media: dict[Name, Medium] = Field(default_factory=dict)
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()
-    lights: tuple[PointLight, ...] = ()
+    lights: tuple[Light, ...] = ()
     transport: Transport = Transport()
     probes: tuple[Probe, ...] = ()
     variants: tuple[Variant, ...] = ()

@@ -107,9 +107,13 @@ def _camera_in_medium(
 def _ray_origins(scene: ResolvedScene) -> list[Vec3]:
     """Where rays begin: the camera, or for parallel rays some points of its film."""
     camera = scene.camera
-    if isinstance(camera, resolved.Perspective):
-        return [camera.origin]
-    half = np.array([camera.width, camera.width * scene.film.height / scene.film.width]) / 2
+    match camera:
+        case resolved.Perspective():
+            return [camera.origin]
+        case resolved.ThinLens():
+            half = np.array([camera.aperture, camera.aperture])
+        case resolved.Orthographic():
+            half = np.array([camera.width, camera.width * scene.film.height / scene.film.width]) / 2
     axes = np.array([camera.right, camera.up])
     steps = np.linspace(-1, 1, 5)
     points = [np.array(camera.origin) + (half * (i, j)) @ axes for i in steps for j in steps]

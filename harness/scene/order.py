@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +12,11 @@ from harness.scene.containment import Relation, bounds, relation, signed_distanc
 from harness.scene.findings import Attempts, Finding, SceneInvalid
 
 Solids = Sequence[resolved.Solid]
+
+# A scene that has more wrong than this is told of these alone.
+MOST_FINDINGS = 20
+# Comparing two solids takes up to half a millisecond.
+MOST_PAIRS = 5_000
 
 
 def placed(
@@ -26,7 +30,9 @@ def placed(
     around: list[set[int]] = [set() for _ in solids]
     meets: list[set[int]] = [set() for _ in solids]
     attempts = Attempts()
-    for i, j in itertools.combinations(range(len(solids)), 2):
+    for i, j in _near(solids, tolerance):
+        if len(attempts.findings) >= MOST_FINDINGS:
+            break
         found = relation(solids[i].shape, solids[j].shape, tolerance)
         if found is Relation.INSIDE:
             around[i].add(j)
@@ -56,6 +62,22 @@ def placed(
         )
         for solid, outer, rank, neighbours in zip(solids, around, ranks, meets, strict=True)
     )
+
+
+def _near(solids: Solids, tolerance: float) -> list[tuple[int, int]]:
+    """The pairs of solids whose boxes meet; raises SceneInvalid where these are too many."""
+    boxes = np.array([bounds(solid.shape) for solid in solids]).reshape(-1, 2, 3)
+    pairs = []
+    for i, (low, high) in enumerate(boxes):
+        later = boxes[i + 1 :]
+        meets = np.all((later[:, 0] <= high + tolerance) & (later[:, 1] >= low - tolerance), axis=1)
+        pairs += [(i, i + 1 + int(k)) for k in np.flatnonzero(meets)]
+        if len(pairs) > MOST_PAIRS:
+            message = (
+                f"more than {MOST_PAIRS} pairs of solids overlap, or are as near as their boxes"
+            )
+            raise SceneInvalid(Finding(("solids",), message, f"{len(solids)} solids", "fewer"))
+    return pairs
 
 
 def _not_hidden(outer: resolved.Solid, own: int, others: int) -> None:

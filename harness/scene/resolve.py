@@ -69,6 +69,7 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
         for i, plane in enumerate(probe.planes):
             attempts.attempt(("probes", k, "planes", i), rectangle, plane)
     camera = attempts.attempt(("camera",), _camera, case.camera)
+    lights = [attempts.attempt(("lights", k), _light, light) for k, light in enumerate(case.lights)]
     attempts.raise_any()
     assert camera is not None
     surfaces = tuple(
@@ -87,10 +88,7 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
             if shape is not None
         ),
         surfaces=surfaces,
-        lights=tuple(
-            resolved.PointLight(position=light.position, intensity=light.intensity)
-            for light in case.lights
-        ),
+        lights=tuple(light for light in lights if light is not None),
         background=case.background,
         transport=resolved.Transport(
             max_depth=case.transport.max_depth, min_weight=case.transport.min_weight
@@ -141,17 +139,32 @@ def _camera(camera: model.Camera) -> resolved.Camera:
             )
         )
     up = cross(right, forward)
-    if isinstance(camera, model.PerspectiveCamera):
-        return resolved.Perspective(
-            origin=camera.origin,
-            right=right,
-            up=up,
-            forward=forward,
-            tan_half_fov_x=math.tan(math.radians(camera.fov_x / 2)),
+    stand = {"origin": camera.origin, "right": right, "up": up, "forward": forward}
+    match camera:
+        case model.OrthographicCamera():
+            return resolved.Orthographic.model_validate({**stand, "width": camera.width})
+        case model.PerspectiveCamera():
+            half = math.tan(math.radians(camera.fov_x / 2))
+            return resolved.Perspective.model_validate({**stand, "tan_half_fov_x": half})
+        case model.ThinLensCamera():
+            half = math.tan(math.radians(camera.fov_x / 2))
+            lens = {
+                "aperture": camera.aperture,
+                "focus": camera.focus,
+                "lens_samples": camera.lens_samples,
+            }
+            return resolved.ThinLens.model_validate({**stand, "tan_half_fov_x": half, **lens})
+
+
+def _light(light: model.Light) -> resolved.Light:
+    if isinstance(light, model.PointLight):
+        return resolved.PointLight(position=light.position, intensity=light.intensity)
+    direction = unit(light.direction)
+    if direction is None:
+        raise SceneInvalid(
+            Finding(("direction",), "has no direction", quoted(list(light.direction)))
         )
-    return resolved.Orthographic(
-        origin=camera.origin, right=right, up=up, forward=forward, width=camera.width
-    )
+    return resolved.DirectionalLight(direction=direction, irradiance=light.irradiance)
 
 
 def _material(surface: model.Surface, medium_of: dict[str, int], folder: Path) -> resolved.Material:
@@ -170,6 +183,10 @@ def _material(surface: model.Surface, medium_of: dict[str, int], folder: Path) -
             return resolved.Emissive(pattern=_pattern(pattern, folder))
         case model.Diffuse(reflectance=reflectance):
             return resolved.Diffuse(reflectance=reflectance)
+        case model.Phong() as phong:
+            return resolved.Phong(
+                reflectance=phong.reflectance, specular=phong.specular, exponent=phong.exponent
+            )
         case model.Mirror(reflectance=reflectance):
             return resolved.Mirror(reflectance=reflectance)
         case model.Translucent() as translucent:

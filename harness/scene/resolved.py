@@ -20,19 +20,19 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-Vec3 = tuple[float, float, float]
-Rgb = tuple[float, float, float]
+from harness.scene.frozen import Frozen as Frozen
+from harness.scene.frozen import Rgb as Rgb
+from harness.scene.frozen import Vec3 as Vec3
+from harness.scene.resolved_camera import Camera as Camera
+from harness.scene.resolved_camera import Orthographic as Orthographic
+from harness.scene.resolved_camera import Perspective as Perspective
+from harness.scene.resolved_camera import ThinLens as ThinLens
+
 Triple = tuple[int, int, int]
 
 SCENE_FORMAT: Literal["snellcheck-scene"] = "snellcheck-scene"
-
-
-class Frozen(BaseModel):
-    """Immutable, and anything unknown in it is an error."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Frame(Frozen):
@@ -229,6 +229,19 @@ class Diffuse(Frozen):
     reflectance: Rgb
 
 
+class Phong(Frozen):
+    """L = (reflectance cos(theta) + specular cos(alpha)^exponent) E / pi, summed over the lights.
+
+    E is a light's irradiance across its direction, alpha the angle between its mirror direction
+    and the viewer. Nothing is seen of lights on the other side.
+    """
+
+    type: Literal["phong"] = "phong"
+    reflectance: Rgb
+    specular: float
+    exponent: float
+
+
 class Mirror(Frozen):
     type: Literal["mirror"] = "mirror"
     reflectance: Rgb
@@ -262,7 +275,7 @@ class ThinSlab(Frozen):
 
 
 Material = Annotated[
-    Emissive | Diffuse | Mirror | Translucent | ThinSlab, Field(discriminator="type")
+    Emissive | Diffuse | Phong | Mirror | Translucent | ThinSlab, Field(discriminator="type")
 ]
 
 
@@ -305,41 +318,15 @@ class PointLight(Frozen):
     intensity: Rgb
 
 
-class Perspective(Frozen):
-    """Pinhole. The ray through pixel (i, j) of a W x H film, row 0 at the top, has direction
+class DirectionalLight(Frozen):
+    """Travels along the unit vector `direction`; `irradiance` is what faces across it receive."""
 
-    forward + (2 (i + .5) / W - 1) k right + (1 - 2 (j + .5) / H) k (H / W) up
-
-    with k = `tan_half_fov_x`; right, up, forward are orthonormal, right = forward x up.
-    `medium` is what the camera stands in.
-    """
-
-    type: Literal["perspective"] = "perspective"
-    origin: Vec3
-    right: Vec3
-    up: Vec3
-    forward: Vec3
-    tan_half_fov_x: float
-    medium: int = 0
+    type: Literal["directional"] = "directional"
+    direction: Vec3
+    irradiance: Rgb
 
 
-class Orthographic(Frozen):
-    """Parallel rays along `forward` from the plane through `origin`, `width` units across.
-
-    The ray through pixel (i, j) starts at
-    origin + (2 (i + .5) / W - 1) w/2 right + (1 - 2 (j + .5) / H) (H / W) w/2 up.
-    """
-
-    type: Literal["orthographic"] = "orthographic"
-    origin: Vec3
-    right: Vec3
-    up: Vec3
-    forward: Vec3
-    width: float
-    medium: int = 0
-
-
-Camera = Annotated[Perspective | Orthographic, Field(discriminator="type")]
+Light = Annotated[PointLight | DirectionalLight, Field(discriminator="type")]
 
 
 class Film(Frozen):
@@ -370,6 +357,6 @@ class ResolvedScene(Frozen):
     media: tuple[Medium, ...]
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()
-    lights: tuple[PointLight, ...] = ()
+    lights: tuple[Light, ...] = ()
     background: Rgb = (0.0, 0.0, 0.0)
     transport: Transport

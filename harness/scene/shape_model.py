@@ -142,7 +142,7 @@ class Icosphere(Placed):
     type: Literal["icosphere"]
     center: Vec3 = (0, 0, 0)
     radius: Positive
-    subdivisions: Annotated[int, Field(ge=0, le=8)]
+    subdivisions: Annotated[int, Field(ge=0, le=7)]  # 327,680 triangles; see MOST_TRIANGLES
     smooth: bool = False
 
 

@@ -32,10 +32,7 @@ def varied(case: model.Case, variant: model.Variant) -> model.Case:
             "camera": camera.model_copy(update=place),
             "solids": tuple(_with_shape(s, matrix, more) for s in case.solids),
             "surfaces": tuple(_with_shape(s, matrix, more) for s in case.surfaces),
-            "lights": tuple(
-                light.model_copy(update={"position": rotated(matrix, light.position)})
-                for light in case.lights
-            ),
+            "lights": tuple(_turned_light(light, matrix) for light in case.lights),
             "probes": tuple(
                 probe.model_copy(
                     update={"planes": tuple(_turned(p, matrix, more) for p in probe.planes)}
@@ -44,6 +41,12 @@ def varied(case: model.Case, variant: model.Variant) -> model.Case:
             ),
         }
     )
+
+
+def _turned_light(light: model.Light, matrix: Matrix) -> model.Light:
+    if isinstance(light, model.DirectionalLight):
+        return light.model_copy(update={"direction": rotated(matrix, light.direction)})
+    return light.model_copy(update={"position": rotated(matrix, light.position)})
 
 
 def _with_shape(owner: Any, matrix: Matrix, more: tuple[model.Rotation, ...]) -> Any:

@@ -55,14 +55,18 @@ def describe(scene: rs.ResolvedScene, samples: int = 64) -> Node:
     for k, surface in enumerate(scene.surfaces):
         node |= _surface(f"surface_{k}", surface)
     for k, light in enumerate(scene.lights):
-        node[f"light_{k}"] = {
-            "type": "point",
-            "position": list(light.position),
-            "intensity": rgb(light.intensity),
-        }
+        node[f"light_{k}"] = _light(light)
     if any(scene.background):
         node["background"] = {"type": "constant", "radiance": rgb(scene.background)}
     return node
+
+
+def _light(light: rs.Light) -> Node:
+    if isinstance(light, rs.DirectionalLight):
+        irradiance = rgb(light.irradiance)
+        return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
+    intensity = rgb(light.intensity)
+    return {"type": "point", "position": list(light.position), "intensity": intensity}
 
 
 def rgb(value: rs.Rgb) -> Node:
@@ -107,6 +111,8 @@ def _sensor(scene: rs.ResolvedScene, samples: int) -> Node:
         },
         "sampler": {"type": "independent", "sample_count": samples},
     }
+    if isinstance(camera, rs.ThinLens):
+        raise RendererUnsupported("Mitsuba's lens is sampled at random, not at given points")
     if isinstance(camera, rs.Perspective):
         sensor["type"] = "perspective"
         sensor["fov_axis"] = "x"
@@ -173,6 +179,10 @@ def _surface(name: str, surface: rs.Surface) -> Node:
             return {name: _patterned(surface, pattern)}
         case rs.Diffuse(reflectance=reflectance):
             look = {"bsdf": _diffuse(reflectance)}
+        case rs.Phong():
+            raise RendererUnsupported(
+                f"surface {surface.name!r}: Mitsuba's phong is normalised, and another model"
+            )
         case rs.Mirror(reflectance=reflectance):
             look = {"bsdf": _mirror(reflectance)}
         case rs.Translucent() as translucent:

@@ -58,6 +58,9 @@ def scaled(scene: rs.ResolvedScene, factor: float) -> rs.ResolvedScene:
     camera = scene.camera.model_copy(update={"origin": _times(scene.camera.origin, factor)})
     if isinstance(camera, rs.Orthographic):
         camera = camera.model_copy(update={"width": camera.width * factor})
+    elif isinstance(camera, rs.ThinLens):
+        lens = {"aperture": camera.aperture * factor, "focus": camera.focus * factor}
+        camera = camera.model_copy(update=lens)
     return scene.model_copy(
         update={
             "metres_per_unit": scene.metres_per_unit / factor,
@@ -70,16 +73,7 @@ def scaled(scene: rs.ResolvedScene, factor: float) -> rs.ResolvedScene:
                 s.model_copy(update={"shape": _scaled_shape(s.shape, factor)}) for s in scene.solids
             ),
             "surfaces": tuple(_scaled_surface(s, factor) for s in scene.surfaces),
-            "lights": tuple(
-                light.model_copy(
-                    update={
-                        "position": _times(light.position, factor),
-                        # irradiance goes with intensity over distance squared
-                        "intensity": _times(light.intensity, factor**2),
-                    }
-                )
-                for light in scene.lights
-            ),
+            "lights": tuple(_scaled_light(light, factor) for light in scene.lights),
         }
     )
 
@@ -87,6 +81,15 @@ def scaled(scene: rs.ResolvedScene, factor: float) -> rs.ResolvedScene:
 def _times(vector: rs.Vec3, factor: float) -> rs.Vec3:
     x, y, z = vector
     return x * factor, y * factor, z * factor
+
+
+def _scaled_light(light: rs.Light, factor: float) -> rs.Light:
+    """Irradiance goes with intensity over distance squared."""
+    if isinstance(light, rs.DirectionalLight):
+        return light
+    intensity = _times(light.intensity, factor**2)
+    position = _times(light.position, factor)
+    return light.model_copy(update={"position": position, "intensity": intensity})
 
 
 def _scaled_frame(frame: rs.Frame, factor: float) -> rs.Frame:

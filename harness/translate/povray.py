@@ -37,7 +37,7 @@ from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 from harness.scene.containment import bounds, signed_distance
 from harness.translate.mitsuba_scale import scaled
-from harness.translate.povray_fit import SHADOW_FLOOR, exposure, length_scale
+from harness.translate.povray_fit import SHADOW_FLOOR, exposure, extent, length_scale
 from harness.translate.povray_shapes import number, rgb, shape_text, vector
 
 MAX_TRACE_LEVEL = 256
@@ -144,8 +144,19 @@ class Writer:
         """Of a medium. Homogeneous, so one sample of one interval is exact."""
         return f"media {{ absorption {rgb(per_unit)} method 1 intervals 1 samples 1, 1 }}"
 
-    def _light(self, light: rs.PointLight) -> str:
-        """Radiance of a diffuse face is pigment * colour * cos * 2 fade^2 / r^2, without 1/pi."""
+    def _light(self, light: rs.Light) -> str:
+        """Radiance of a diffuse face is pigment * colour * cos * 2 fade^2 / r^2, without 1/pi.
+
+        A directional light stands beyond all that is there, and does not fade.
+        """
+        if isinstance(light, rs.DirectionalLight):
+            away = 4 * extent(self.scene)
+            place = [-away * d for d in light.direction]
+            return (
+                f"light_source {{ {vector(place)}, "
+                f"{rgb(light.irradiance, self.exposure / math.pi)} "
+                f"parallel point_at <0, 0, 0> media_interaction off }}"
+            )
         factor = self.exposure / (math.pi * 2 * FADE_DISTANCE**2)
         return (
             f"light_source {{ {vector(light.position)}, {rgb(light.intensity, factor)} "
@@ -180,6 +191,10 @@ class Writer:
             case rs.Diffuse():
                 pigment = f"pigment {{ {rgb(material.reflectance)} }}"
                 return self._opaque(shape, f"{pigment} finish {{ ambient 0 diffuse 1 }}")
+            case rs.Phong():
+                finish = f"phong {number(material.specular)} phong_size {number(material.exponent)}"
+                pigment = f"pigment {{ {rgb(material.reflectance)} }}"
+                return self._opaque(shape, f"{pigment} finish {{ ambient 0 diffuse 1 {finish} }}")
             case rs.Mirror():
                 finish = f"ambient 0 diffuse 0 reflection {{ {rgb(material.reflectance)} }}"
                 return self._opaque(shape, f"pigment {{ rgb 0 }} finish {{ {finish} }}")
@@ -272,6 +287,8 @@ def _translucent(shape: rs.SurfaceShape, material: rs.Translucent) -> str:
 def _camera(scene: rs.ResolvedScene) -> str:
     """The vectors alone say how the image lies, so POV-Ray's handedness plays no part."""
     camera, aspect = scene.camera, scene.film.height / scene.film.width
+    if isinstance(camera, rs.ThinLens):
+        raise RendererUnsupported("POV-Ray's lens is sampled at points of its own")
     if isinstance(camera, rs.Perspective):
         kind, width = "perspective", 2 * camera.tan_half_fov_x
     else:

@@ -69,11 +69,17 @@ def thickness(shape: rs.SolidShape) -> float:
             return float(np.ptp(np.array(shape.vertices), axis=0).min())
 
 
+def extent(scene: rs.ResolvedScene) -> float:
+    """No coordinate of anything in the scene is larger."""
+    return max(_extents(scene))
+
+
 def _extents(scene: rs.ResolvedScene) -> Iterator[float]:
     """Upper bounds of the coordinates of all that is in the scene."""
     yield float(np.abs(scene.camera.origin).max())
     for light in scene.lights:
-        yield float(np.abs(light.position).max())
+        if isinstance(light, rs.PointLight):
+            yield float(np.abs(light.position).max())
     for solid in scene.solids:
         yield _extent(solid.shape)
     for surface in scene.surfaces:
@@ -114,6 +120,8 @@ def _brightest(scene: rs.ResolvedScene, surface: rs.Surface) -> float:
             return _brightest_radiance(pattern)
         case rs.Diffuse(reflectance=reflectance):
             return _brightest_lit(scene, surface.shape, reflectance)
+        case rs.Phong(reflectance=(r, g, b), specular=glint):
+            return _brightest_lit(scene, surface.shape, (r + glint, g + glint, b + glint))
         case rs.Translucent(color=color):
             return _brightest_lit(scene, surface.shape, color)
     return 0.0
@@ -137,6 +145,9 @@ def _brightest_lit(scene: rs.ResolvedScene, shape: rs.SurfaceShape, reflectance:
     """The bound reflectance / pi * sum of intensity / distance^2, over the nearest points."""
     radiance = np.zeros(3)
     for light in scene.lights:
+        if isinstance(light, rs.DirectionalLight):
+            radiance += np.array(reflectance) / math.pi * np.array(light.irradiance)
+            continue
         distance = _distance(shape, np.array([light.position]))
         if distance <= 0.0:
             raise RendererUnsupported("a point light touches or is inside a surface that it lights")

@@ -32,7 +32,10 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
             for s in scene.surfaces
         ),
         lights=tuple(
-            tracer.scene.PointLight(light.position, light.intensity) for light in scene.lights
+            tracer.scene.PointLight(light.position, light.intensity)
+            if isinstance(light, resolved.PointLight)
+            else tracer.scene.DirectionalLight(light.direction, light.irradiance)
+            for light in scene.lights
         ),
         background=scene.background,
         ambient=media[0],
@@ -45,15 +48,16 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
     )
 
 
-def _camera(
-    camera: resolved.Camera,
-) -> tracer.camera.Perspective | tracer.camera.Orthographic:
+def _camera(camera: resolved.Camera) -> tracer.camera.Camera:
     axes = camera.origin, camera.right, camera.up, camera.forward
     match camera:
         case resolved.Perspective():
             return tracer.camera.Perspective(*axes, camera.tan_half_fov_x)
         case resolved.Orthographic():
             return tracer.camera.Orthographic(*axes, camera.width)
+        case resolved.ThinLens():
+            lens = camera.aperture, camera.focus, camera.lens_samples
+            return tracer.camera.ThinLens(*axes, camera.tan_half_fov_x, *lens)
 
 
 def _solid_shape(shape: resolved.SolidShape) -> tracer.scene.SolidShape:
@@ -122,6 +126,8 @@ def _material(
             return tracer.scene.Emissive(_pattern(material.pattern))
         case resolved.Diffuse():
             return tracer.scene.Diffuse(material.reflectance)
+        case resolved.Phong():
+            return tracer.scene.Phong(material.reflectance, material.specular, material.exponent)
         case resolved.Mirror():
             return tracer.scene.Mirror(material.reflectance)
         case resolved.Translucent():

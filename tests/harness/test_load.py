@@ -169,7 +169,8 @@ EDITS = {
     ),
     "missing table": (
         '[camera]\ntype = "perspective"\norigin = [0, 0, 6]\ntarget = [0, 0, 0]\nfov_x = 30', "",
-        1, "camera", "missing", None, "a table of type orthographic or perspective", None,
+        1, "camera", "missing", None,
+        "a table of type orthographic, perspective or thin_lens", None,
     ),
     "missing type": (
         'type = "sphere", ', "",
@@ -184,7 +185,7 @@ EDITS = {
     "unknown material": (
         '"emissive"', '"emisive"',
         23, "surfaces[0].material.type", "unknown type", '"emisive"',
-        "diffuse, emissive, mirror, thin_slab or translucent", "emissive",
+        "diffuse, emissive, mirror, phong, thin_slab or translucent", "emissive",
     ),
     "unknown pattern": (
         '"constant"', '"chequer"',
@@ -193,7 +194,8 @@ EDITS = {
     ),
     "unknown camera": (
         '"perspective"', '"fisheye"',
-        7, "camera.type", "unknown type", '"fisheye"', "orthographic or perspective", None,
+        7, "camera.type", "unknown type", '"fisheye"',
+        "orthographic, perspective or thin_lens", None,
     ),
     "unknown format": (
         "format = 1", "format = 2", 1, "format", "unknown format", "2", "1", None,
@@ -377,7 +379,7 @@ def test_further_renderers_may_be_named(scene_file: Path) -> None:
         ('a = "x', 1, "not valid TOML: Unterminated string (at end of document)"),
         (b"a = 1\nb = '\xff'\n", 2, "not UTF-8 text"),
         ("a = " + "[" * 3000 + "]" * 3000, None, "nested too deeply"),
-        ("a = " + "9" * 5000, None, "not valid TOML"),
+        ("a = " + "9" * 5000, 1, "not valid TOML: a number of thousands of digits"),
         (b"a = 1\0", 1, "not valid TOML"),
     ],
 )

@@ -1,0 +1,1 @@
+"""Malformed input, made by the thousand: none of it may end in a traceback, a hang or a flood."""
