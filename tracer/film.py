@@ -91,8 +91,6 @@ def developed(
     samples: Floats, sampling: Sampling, first: int, begin: int, end: int, height: int
 ) -> Floats:
     """Rows [begin, end) of the pixels (H, W, ...); row 0 of the samples is row `first` of all."""
-    if sampling.side == 1 and isinstance(sampling.filter, Box):
-        return samples
     table, start = weights(sampling, begin, end, height)
     rows = _weighed(samples, table, start - first)
     width = samples.shape[1] // sampling.side

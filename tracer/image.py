@@ -47,8 +47,8 @@ class Samples(NamedTuple):
     radiance: Floats  # (h, w, 3)
     cut: Floats  # (h, w)
     closest: Floats
-    rays: NDArray[np.int64]
-    disperses: NDArray[np.uint8]  # 1 where the wavelength matters
+    rays: NDArray[np.int64]  # (h,)
+    disperses: NDArray[np.uint8]  # (h, w), 1 where the wavelength matters
 
 
 @compiled
@@ -72,11 +72,12 @@ def _expose(
     width, side = samples.cut.shape[1], int(camera[SIDE])
     share = 1.0 / (side * side)
     for j in range(begin, end):
+        samples.rays[j] = 0
         for i in range(width):
             if samples.disperses[j, i] == 0:
                 continue
             x, y = pixel_centre(i, first + j, width, height)
-            seen, cut, closest, rays, disperses = BLACK, 0.0, np.inf, 0, False
+            seen, cut, closest, disperses = BLACK, 0.0, np.inf, False
             for k in range(side * side):
                 u, v = lens_point(k, side)
                 o, d = primary_ray(camera, x, y, u, v)
@@ -84,12 +85,12 @@ def _expose(
                 seen = add(seen, scale(share, one.radiance))
                 cut += share * one.cut
                 closest = min(closest, one.closest)
-                rays += one.rays
+                samples.rays[j] += one.rays
                 disperses |= one.disperses
             for c in range(3):
                 samples.radiance[j, i, c] = seen[c]
             samples.cut[j, i], samples.closest[j, i] = cut, closest
-            samples.rays[j, i], samples.disperses[j, i] = rays, disperses
+            samples.disperses[j, i] = disperses
 
 
 def render(
@@ -121,22 +122,37 @@ def render_spectrum(
     """
     arrays, media = flatten(scene), media_of(scene)
     scenes = [arrays._replace(media=media_table(media, w)) for w in wavelengths]
+    if sampling == CENTRES:
+        return _of_centres(scene, scenes, width, height, threads)
     film = (height, width)
     images = [Render(np.empty((*film, 3)), np.empty(film), np.empty(film), 0) for _ in scenes]
     for begin, end in _strips(width, height, sampling):
         side, around = sampling.side, reach(sampling)
         first, last = max(0, begin * side - around), min(height * side, end * side + around)
-        samples = _undeveloped(last - first, width * side)
+        samples = _unexposed(last - first, width * side)
         for k, one in enumerate(scenes):
-            samples.rays[...] = 0
-            _take(scene, one, height * side, first, samples, threads)
+            rays = _take(scene, one, height * side, first, samples, threads)
             image, rows = images[k], slice(begin, end)
             for pixels, sampled in ((image.pixels, samples.radiance), (image.cut, samples.cut)):
                 pixels[rows] = developed(sampled, sampling, first, begin, end, height)
             own = samples.closest[begin * side - first : end * side - first]
             blocks = own.reshape(end - begin, side, width, side)
             image.closest[rows] = blocks.min(axis=(1, 3))
-            images[k] = replace(image, rays=image.rays + int(samples.rays.sum()))
+            images[k] = replace(image, rays=image.rays + rays)
+    return images
+
+
+def _of_centres(
+    scene: Scene, scenes: list[Arrays], width: int, height: int, threads: int | None
+) -> list[Render]:
+    """As `render_spectrum` where a sample is a pixel: nothing is developed."""
+    samples, images = _unexposed(height, width), []
+    for one in scenes:
+        rays = _take(scene, one, height, 0, samples, threads)
+        pixels, cut, closest = samples.radiance, samples.cut, samples.closest
+        if one is not scenes[-1]:
+            pixels, cut, closest = pixels.copy(), cut.copy(), closest.copy()
+        images.append(Render(pixels, cut, closest, rays))
     return images
 
 
@@ -146,20 +162,21 @@ def _strips(width: int, height: int, sampling: Sampling) -> Iterator[tuple[int, 
         yield begin, min(begin + rows, height)
 
 
-def _undeveloped(height: int, width: int) -> Samples:
+def _unexposed(height: int, width: int) -> Samples:
     film = (height, width)
     return Samples(
         np.empty((*film, 3)),
         np.empty(film),
         np.empty(film),
-        np.empty(film, np.int64),
+        np.empty(height, np.int64),
         np.ones(film, np.uint8),
     )
 
 
 def _take(
     scene: Scene, arrays: Arrays, height: int, first: int, samples: Samples, threads: int | None
-) -> None:
+) -> int:
+    """Exposes `samples` whose row 0 is row `first` of a film of `height`; how many rays it took."""
     transport = scene.transport
     limits = Limits(transport.max_depth, transport.min_weight)
     lobes = Lobes(transport.reflection, transport.transmission, transport.radiance_n2)
@@ -173,3 +190,4 @@ def _take(
         _expose(arrays, limits, lobes, camera, first, height, begin, end, waiting, stack, samples)
 
     for_bands(some, rows, BAND, threads)
+    return int(samples.rays.sum())

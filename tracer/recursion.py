@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.arrays import MEDIUM, Arrays, Floats
+from tracer.arrays import EMISSIVE, MATERIAL, MEDIUM, Arrays, Floats
 from tracer.compiled import inlined
 from tracer.hit import NOTHING, UNKNOWN, nearest_hit
 from tracer.light import absorbed, surroundings
 from tracer.shapes import vec_at
-from tracer.surface import BLACK, Lobes, scatter
-from tracer.vector import Vec, add, mul
+from tracer.surface import BLACK, Lobes, emitted, scatter
+from tracer.vector import Vec, add, along, mul
 
 TELLING = 1e-4  # a weight whose loss would show in a picture
 
@@ -107,11 +107,15 @@ def radiance(
         if hit == NOTHING:
             seen = add(seen, mul(weight, surroundings(scene, ray.d)))
         else:
+            if ray.segments > 1 and t < closest and max(weight[0], weight[1], weight[2]) >= TELLING:
+                closest = t
+        if hit != NOTHING and scene.objects[hit, MATERIAL] == EMISSIVE:
+            shown = emitted(scene, hit, along(ray.o, t, ray.d))
+            seen = add(seen, mul(weight, shown))
+        elif hit != NOTHING:
             inside = scene.objects[hit, MEDIUM]  # of a thin slab
             for known in (medium, beyond, inside):
                 disperses |= scene.media[known, 4] > 0.0
-            if ray.segments > 1 and t < closest and max(weight[0], weight[1], weight[2]) >= TELLING:
-                closest = t
             at = scatter(scene, lobes, ray.o, t, ray.d, medium, hit, face, entering, beyond, stack)
             seen = add(seen, mul(weight, at.sent))
             reflected = Ray(

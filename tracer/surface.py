@@ -7,7 +7,6 @@ from typing import NamedTuple
 from tracer.arrays import (
     DIELECTRIC,
     DIFFUSE,
-    EMISSIVE,
     EXTERIOR,
     FIRST,
     MATERIAL,
@@ -123,6 +122,15 @@ def _slab_lobes(R: float, a: float, lobes: Lobes) -> tuple[float, float]:
 
 
 @inlined
+def emitted(scene: Arrays, hit: int, p: Vec) -> Vec:
+    """What an emissive surface shows at `p`."""
+    u, v = 0.5, 0.5
+    if scene.objects[hit, SHAPE] >= RECTANGLE:
+        u, v = face_coordinates(p, scene.rows, scene.objects[hit, FIRST])
+    return pattern_radiance(scene.patterns, scene.objects[hit, PATTERN], scene.texels, u, v)
+
+
+@inlined
 def scatter(
     scene: Arrays,
     lobes: Lobes,
@@ -157,11 +165,6 @@ def scatter(
         if lobes.transmission and transmits:
             T = (1.0 - R) * ((ior_i / ior_t) ** 2 if lobes.radiance_n2 else 1.0)
             passed = (T, T, T)
-    elif material == EMISSIVE:
-        u, v = 0.5, 0.5
-        if objects[hit, SHAPE] >= RECTANGLE:
-            u, v = face_coordinates(p, scene.rows, objects[hit, FIRST])
-        sent = pattern_radiance(scene.patterns, objects[hit, PATTERN], scene.texels, u, v)
     elif material == MIRROR:
         wr, reflected = reflect(wi, n), vec_at(scene.materials, hit, 0)
     elif material == DIFFUSE:

@@ -12,15 +12,16 @@ from concurrent.futures import ThreadPoolExecutor
 
 def for_bands(work: Callable[[int, int], None], total: int, band: int, threads: int | None) -> None:
     """Calls ``work(begin, end)`` for all bands of [0, total), on all cores by default."""
-    workers = threads or os.cpu_count() or 1
-    bands = [(begin, min(begin + band, total)) for begin in range(0, total, band)]
-    if not bands:
-        return
-    work(*bands[0])  # the first call compiles, if anything must be
-    if workers == 1:
-        for begin, end in bands[1:]:
-            work(begin, end)
+    begins = iter(range(0, total, band))  # shared: each thread takes what is next
+
+    def some() -> None:
+        for begin in begins:
+            work(begin, min(begin + band, total))
+
+    workers = min(threads or os.cpu_count() or 1, -(-total // band))
+    if workers <= 1:
+        some()
         return
     with ThreadPoolExecutor(workers) as pool:
-        for done in [pool.submit(work, begin, end) for begin, end in bands[1:]]:
+        for done in [pool.submit(some) for _ in range(workers)]:
             done.result()

@@ -9,7 +9,9 @@ from typing import Any
 OURS, GOAL, OTHER = "#0b62c4", "#8a94a0", "#c4480b"
 
 
-def draw(document: Mapping[str, Any], file: Path) -> None:
+def draw(
+    figures: Mapping[str, Any], goals: Mapping[str, float], curves: Mapping[str, Any], file: Path
+) -> None:
     """Writes an SVG with ratios beside their goals, and cost over sizes."""
     import matplotlib as mpl
 
@@ -19,8 +21,7 @@ def draw(document: Mapping[str, Any], file: Path) -> None:
     style = {"svg.hashsalt": "snellcheck", "font.size": 9, "axes.spines.top": False}
     with mpl.rc_context({**style, "axes.spines.right": False, "axes.titlesize": 10}):
         figure, axes = plt.subplots(2, 3, figsize=(13, 7), layout="constrained")
-        _ratios(axes[0, 0], document["figures"], document["goals"])
-        curves = document["curves"]
+        _ratios(axes[0, 0], figures, goals)
         _curve(axes[0, 1], curves["pixels"], "pixels", "s", "Pixels: linear", linear=True)
         _curve(axes[0, 2], curves["depth"], "max_depth", "s", "Depth: linear", linear=True)
         title = "Wavelengths: cheaper, the more there are"
@@ -40,7 +41,7 @@ def _ratios(axes: Any, figures: Mapping[str, Any], goals: Mapping[str, float]) -
         axes.plot([goals[name]] * 2, [place - 0.4, place + 0.4], color=GOAL, linewidth=3)
         ratio = figures[name]["ratio"]
         axes.annotate(f" {ratio:.3g}", (ratio, place), va="center")
-    axes.set_yticks(places, [name.replace("_", " ") for name in names])
+    axes.set_yticks(places, [name.replace("_", " ").replace(".", "\n") for name in names])
     axes.invert_yaxis()
     axes.set_xscale("log")
     axes.set_title("Ratios; grey: the goals")
