@@ -19,6 +19,7 @@ from tracer.arrays import (
     Arrays,
     Floats,
     flatten,
+    ranked,
 )
 from tracer.compiled import compiled, inlined
 from tracer.errors import SceneError
@@ -27,8 +28,10 @@ from tracer.optics import reflect
 from tracer.scene import Scene
 from tracer.surface import interface, thin_slab, upright
 from tracer.threads import for_bands
-from tracer.vector import Vec, scale
+from tracer.vector import Vec, dot, scale
 
+MOST_LEGS = 32  # of a main way that are kept
+NO_LEG = -2
 BAND = 4096  # rays that a thread takes at a time
 
 # How a ray ended.
@@ -47,8 +50,13 @@ class Paths(NamedTuple):
     `status` (n,) int8; `surface` (n,) index into scene.surfaces or -1; `point` (n, 3) where the
     ray landed, NaN unless it did; `direction` (n, 3) of its last leg; `weight` (n,) product of the
     Fresnel factors R and 1 - R; `optical_length` (n,) sum of ior times length up to the last
-    point; `vertices` (n, len(path) + 2, 3) from the origin on, NaN-padded, and empty unless they
-    are asked for.
+    point.
+
+    The rest is there only if vertices are asked for, and padded with NaN (`solid` with NO_LEG):
+    `vertices` (n, legs + 1, 3) from the origin on. Per leg between two of them, `solid` (n, legs)
+    is the index into scene.solids of what it goes through, -1 outside of all; and at the leg's end
+    `cos_theta_i`, `cos_theta_t` and `reflectance` (n, legs) are those of the interface, cos_theta_t
+    NaN in total internal reflection.
     """
 
     status: NDArray[np.int8]
@@ -58,6 +66,37 @@ class Paths(NamedTuple):
     weight: Floats
     optical_length: Floats
     vertices: Floats
+    solid: NDArray[np.int32]
+    cos_theta_i: Floats
+    cos_theta_t: Floats
+    reflectance: Floats
+
+
+class Log(NamedTuple):
+    """What is kept of one ray, if anything: rows of `Paths`, and how many legs there are so far."""
+
+    vertices: Floats
+    solid: NDArray[np.int32]
+    cos_theta_i: Floats
+    cos_theta_t: Floats
+    reflectance: Floats
+
+
+class Beyond(NamedTuple):
+    """How a ray goes on from where it met something: from `p` along `d`.
+
+    `status` is GOING if it does. `factor` is what its weight is multiplied by, `optical` the
+    optical length that a thin slab adds; the rest is NaN where no interface is.
+    """
+
+    status: int
+    p: Vec
+    d: Vec
+    factor: float
+    optical: float
+    cos_theta_i: float
+    cos_theta_t: float
+    reflectance: float
 
 
 @inlined
@@ -78,11 +117,10 @@ def _take(
     beyond: int,
     transmit: bool,
     twice: bool,
-) -> tuple[int, Vec, Vec, float, float]:
-    """(status, where the ray goes on, direction, weight, optical length) beyond an interface.
+) -> Beyond:
+    """Takes the lobe that the path's letter asks for, where it exists.
 
-    Takes the lobe that the path's letter asks for; `twice` says that the next letter asks for
-    transmission too, which a thin slab needs. The status is GOING where the lobe exists.
+    `twice` says that the next letter asks for transmission too, which a thin slab needs.
     """
     wi = scale(-1.0, d)
     material = scene.objects[hit, MATERIAL]
@@ -91,23 +129,27 @@ def _take(
         if scene.objects[hit, NORMALS] >= 0:
             n = upright(wi, n, geometric, ior_i, ior_t)
         transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
+        cos_i, cos_t = dot(wi, n), -dot(wt, n) if transmits else np.nan
         if not transmit:
-            return GOING, p, wr, R, 0.0
-        return (GOING, p, wt, 1.0 - R, 0.0) if transmits else (TIR, p, wr, 1.0, 0.0)
+            return Beyond(GOING, p, wr, R, 0.0, cos_i, cos_t, R)
+        if not transmits:
+            return Beyond(TIR, p, wr, 1.0, 0.0, cos_i, cos_t, R)
+        return Beyond(GOING, p, wt, 1.0 - R, 0.0, cos_i, cos_t, R)
     if material == THIN_SLAB:
         transmits, R, wr, p_t, length, back = thin_slab(scene, hit, p, d, n, entering)
+        cos_i = dot(wi, n)
         if not transmit:
-            return GOING, p, wr, R, 0.0
+            return Beyond(GOING, p, wr, R, 0.0, cos_i, np.nan, R)
         if not transmits:
-            return TIR, p, wr, 1.0, 0.0
+            return Beyond(TIR, p, wr, 1.0, 0.0, cos_i, np.nan, R)
         outside, inside = scene.objects[hit, EXTERIOR], scene.objects[hit, MEDIUM]
         optical = scene.media[inside, 0] * length - scene.media[outside, 0] * back
-        return GOING if twice else CUT, p_t, d, (1.0 - R) * (1.0 - R), optical
+        passed = (1.0 - R) * (1.0 - R)
+        return Beyond(GOING if twice else CUT, p_t, d, passed, optical, cos_i, np.nan, R)
     if material == MIRROR and not transmit:
-        return GOING, p, reflect(wi, n), 1.0, 0.0
-    if material == TRANSLUCENT and transmit:
-        return GOING, p, d, 1.0, 0.0
-    return MISS, p, d, 1.0, 0.0
+        return Beyond(GOING, p, reflect(wi, n), 1.0, 0.0, dot(wi, n), np.nan, np.nan)
+    going = material == TRANSLUCENT and transmit
+    return Beyond(GOING if going else MISS, p, d, 1.0, 0.0, dot(wi, n), np.nan, np.nan)
 
 
 @inlined
@@ -116,42 +158,57 @@ def _follow_one(
     o: Vec,
     d: Vec,
     letters: NDArray[np.uint8],
+    main: bool,
     max_depth: int,
-    vertices: Floats,
+    log: Log,
     stack: Floats,
 ) -> tuple[int, int, Vec, Vec, float, float]:
-    """(status, object or NOTHING, last point, last direction, weight, optical length)."""
+    """(status, object or NOTHING, last point, last direction, weight, optical length).
+
+    Along `letters`; or if `main` the main way, until something is met that ends it.
+    """
     weight, optical, medium = 1.0, 0.0, UNKNOWN
     left, left_face, inward = NOTHING, -1, False
     step, corners = 0, 0
     while True:
-        corners = _keep(vertices, corners, o)
+        corners = _keep(log.vertices, corners, o)
         hit, face, t, entering, medium, beyond = nearest_hit(
             scene, o, d, medium, left, left_face, inward, stack
         )
+        if corners <= len(log.solid):
+            log.solid[corners - 1] = medium
         if hit == NOTHING:
             return MISS, NOTHING, o, d, weight, optical
         p, n, geometric = hit_point(scene, o, t, d, hit, face, entering)
         material = scene.objects[hit, MATERIAL]
         optical += scene.media[medium, 0] * t
 
-        if step == len(letters) or step + 1 >= max_depth:
-            _keep(vertices, corners, p)
-            landed = step == len(letters) and material not in (DIELECTRIC, THIN_SLAB)
-            return HIT if landed else CUT, hit, p, d, weight, optical
-        transmit = letters[step] == TRANSMIT
-        twice = step + 1 < len(letters) and letters[step + 1] == TRANSMIT
-        status, o, d, factor, more = _take(
+        opaque = material != DIELECTRIC and material != THIN_SLAB
+        if main:
+            complete = opaque and material != MIRROR and material != TRANSLUCENT
+        else:
+            complete = step == len(letters)
+        if complete or step + 1 >= max_depth:
+            _keep(log.vertices, corners, p)
+            return HIT if complete and opaque else CUT, hit, p, d, weight, optical
+        transmit = material != MIRROR if main else letters[step] == TRANSMIT
+        twice = main or (step + 1 < len(letters) and letters[step + 1] == TRANSMIT)
+        status, o, d, factor, more, cos_theta_i, cos_theta_t, reflectance = _take(
             scene, hit, entering, p, n, geometric, d, medium, beyond, transmit, twice
         )
+        if corners <= len(log.solid):
+            log.cos_theta_i[corners - 1], log.cos_theta_t[corners - 1] = cos_theta_i, cos_theta_t
+            log.reflectance[corners - 1] = reflectance
         weight *= factor
         optical += more
+        if main and status == TIR:
+            status, transmit = GOING, False
         if status != GOING:
-            _keep(vertices, corners, p)
+            _keep(log.vertices, corners, p)
             return status, hit, p, d, weight, optical
         step += 1
         if transmit and material == THIN_SLAB:
-            corners = _keep(vertices, corners, p)
+            corners = _keep(log.vertices, corners, p)
             step += 1
         if transmit and material == DIELECTRIC:
             medium = beyond
@@ -173,6 +230,7 @@ def _follow(
     origins: Floats,
     directions: Floats,
     letters: NDArray[np.uint8],
+    main: bool,
     max_depth: int,
     begin: int,
     end: int,
@@ -182,8 +240,17 @@ def _follow(
     for i in range(begin, end):
         o = (origins[i, 0], origins[i, 1], origins[i, 2])
         d = (directions[i, 0], directions[i, 1], directions[i, 2])
-        way = found.vertices[i] if len(found.vertices) else found.vertices[0:0, 0]
-        status, hit, p, d, weight, length = _follow_one(scene, o, d, letters, max_depth, way, stack)
+        k = i if len(found.vertices) else 0
+        log = Log(
+            found.vertices[k],
+            found.solid[k],
+            found.cos_theta_i[k],
+            found.cos_theta_t[k],
+            found.reflectance[k],
+        )
+        status, hit, p, d, weight, length = _follow_one(
+            scene, o, d, letters, main, max_depth, log, stack
+        )
         found.status[i], found.weight[i], found.optical_length[i] = status, weight, length
         found.surface[i] = hit - solids if status == HIT else -1
         _put(found.direction, i, d)
@@ -195,7 +262,7 @@ def follow(
     scene: Scene,
     origins: ArrayLike,
     directions: ArrayLike,
-    path: str,
+    path: str | None = None,
     *,
     vertices: bool = False,
     threads: int | None = None,
@@ -204,33 +271,52 @@ def follow(
 
     `origins` and unit `directions` are (n, 3). Rays may start in any medium. After the last letter
     a ray must land on a surface. A thin slab is two interfaces, a mirror takes an R and a
-    translucent surface a T. Raises SceneError for a scene or rays that cannot be traced.
+    translucent surface a T. Without `path` rays take the main way, through whatever transmits and
+    back from whatever does not, until they land or have `max_depth` segments.
+
+    `vertices` asks for all that happens on the way, of the main way for up to MOST_LEGS segments.
+    Raises SceneError for a scene or rays that cannot be traced.
     """
     o = np.ascontiguousarray(origins, float).reshape(-1, 3)
     d = np.ascontiguousarray(directions, float).reshape(-1, 3)
     _require_rays(o, d)
-    if set(path) - {"T", "R"}:
+    if path is not None and set(path) - {"T", "R"}:
         raise SceneError(f"a path is made of the letters T and R, not {path!r}")
-    n = len(o)
-    found = Paths(
-        status=np.empty(n, np.int8),
-        surface=np.empty(n, np.int32),
-        point=np.full((n, 3), np.nan),
-        direction=np.empty((n, 3)),
-        weight=np.empty(n),
-        optical_length=np.empty(n),
-        vertices=np.full((n if vertices else 0, len(path) + 2, 3), np.nan),
-    )
+    n, solids, max_depth = len(o), len(scene.solids), scene.transport.max_depth
+    legs = min(max_depth, MOST_LEGS) if path is None else len(path) + 1
+    found = _empty(n, legs, vertices)
     arrays = flatten(scene)
-    letters = np.frombuffer(path.encode(), np.uint8).copy()
-
-    solids, max_depth = len(scene.solids), scene.transport.max_depth
+    letters = np.frombuffer((path or "").encode(), np.uint8).copy()
+    main = path is None
 
     def some(begin: int, end: int) -> None:
-        _follow(arrays, solids, o, d, letters, max_depth, begin, end, found, new_stack(arrays))
+        stack = new_stack(arrays)
+        _follow(arrays, solids, o, d, letters, main, max_depth, begin, end, found, stack)
 
     for_bands(some, n, BAND, threads)
-    return found
+    if not vertices:
+        return found._replace(**{name: getattr(found, name)[:0] for name in Log._fields})
+    places = {id(solid): k for k, solid in enumerate(scene.solids)}
+    order = [places[id(solid)] for solid in ranked(scene.solids)]
+    names = np.array([-1, *order, NO_LEG], np.int32)  # by medium; NO_LEG is the last
+    return found._replace(solid=names[found.solid])
+
+
+def _empty(n: int, legs: int, log: bool) -> Paths:
+    """Room for n rays; without `log`, for the legs of none."""
+    rows, legs = (n, legs) if log else (1, 0)
+    per_leg = (np.full((rows, legs), np.nan) for _ in range(3))
+    return Paths(
+        np.empty(n, np.int8),
+        np.empty(n, np.int32),
+        np.full((n, 3), np.nan),
+        np.empty((n, 3)),
+        np.empty(n),
+        np.empty(n),
+        np.full((rows, legs + 1 if log else 0, 3), np.nan),
+        np.full((rows, legs), -1, np.int32),
+        *per_leg,
+    )
 
 
 def _require_rays(origins: Floats, directions: Floats) -> None:

@@ -9,9 +9,13 @@ import pytest
 
 from tests.tracer.scenes import CAMERA, GLASS, X, Y, Z, angles, cube, cube_mesh, prism, slab, wall
 from tracer.errors import SceneError
-from tracer.path import CUT, HIT, MISS, TIR, follow
-from tracer.scene import Medium, Mirror, Scene, Solid, Surface, ThinSlab
+from tracer.itinerary import itinerary
+from tracer.path import CUT, HIT, MISS, NO_LEG, TIR, follow
+from tracer.scene import Medium, Mirror, Scene, Solid, Surface, ThinSlab, Translucent
 from tracer.shapes import Rectangle, Sphere
+from tracer.solids import cylinder
+
+EPS = float(np.finfo(float).eps)
 
 
 def fan(degrees: np.ndarray, height: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
@@ -165,3 +169,68 @@ def test_bad_rays_are_refused_in_one_message() -> None:
         follow(scene, np.zeros((2, 3)), [(0, 0, -1), (0, 0, 0)], "")
     with pytest.raises(SceneError, match="letters T and R"):
         follow(scene, np.zeros((1, 3)), [(0, 0, -1)], "TX")
+
+
+def test_all_that_happens_on_the_way() -> None:
+    """A ball of water in a glass block: media, angles and factors of each leg, by Snell's law."""
+    solids = (
+        Solid(slab(4.0, front=2.0, half=4.0), Medium(1.5), name="block"),
+        Solid(Sphere((0.0, 0.0, 0.0), 1.0), Medium(1.333), name="drop"),
+    )
+    scene = Scene(CAMERA, solids, (wall(-9.0),))
+    theta = np.radians([0.0, 5.0, 9.0])
+    origins = np.array([[-2.0 * math.tan(t) - 0.3, 0.0, 4.0] for t in theta])
+    directions = np.column_stack([np.sin(theta), 0 * theta, -np.cos(theta)])
+    found = follow(scene, origins, directions, vertices=True)
+    assert (found.status == HIT).all()
+    assert (found.solid[:, :6] == [-1, 0, 1, 0, -1, NO_LEG]).all()
+    assert found.cos_theta_i[:, 0] == pytest.approx(np.cos(theta), rel=4 * EPS)
+    indices = np.array([1.0, 1.5, 1.333, 1.5, 1.0])
+    for k in range(4):
+        cos_i, cos_t = found.cos_theta_i[:, k], found.cos_theta_t[:, k]
+        sin_i, sin_t = np.sqrt(1 - cos_i**2), np.sqrt(1 - cos_t**2)
+        # A root of 1 - cos^2 near 0 loses half of the digits.
+        assert indices[k] * sin_i == pytest.approx(indices[k + 1] * sin_t, abs=4e-8)
+        r_s = (indices[k] * cos_i - indices[k + 1] * cos_t) / (
+            indices[k] * cos_i + indices[k + 1] * cos_t
+        )
+        r_p = (indices[k + 1] * cos_i - indices[k] * cos_t) / (
+            indices[k + 1] * cos_i + indices[k] * cos_t
+        )
+        R = (r_s**2 + r_p**2) / 2
+        assert found.reflectance[:, k] == pytest.approx(R, rel=1e-12)
+    lengths = np.linalg.norm(np.diff(found.vertices[:, :6], axis=1), axis=2)
+    assert found.optical_length == pytest.approx(lengths @ indices, rel=8 * EPS)
+    assert found.weight == pytest.approx((1 - found.reflectance[:, :4]).prod(axis=1), rel=8 * EPS)
+    told = itinerary(scene, found, 1).splitlines()
+    assert len(told) == 6
+    assert "block" in told[1]
+    assert "drop" in told[2]
+    assert told[-1].startswith("landed; weight 0.9")
+
+
+def test_the_main_way_turns_where_light_is_totally_reflected() -> None:
+    """Down a rod of glass: no loss at the side, 45 degrees each time, and out at the end."""
+    rod = Solid(cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1.0, 9.0), Medium(1.5), name="rod")
+    scene = Scene(CAMERA, (rod,), (wall(-9.0),))
+    slope = 1 / math.sqrt(2)
+    found = follow(scene, [[0.0, 0.0, 4.0]], [[slope, 0.0, -slope]], vertices=True)
+    # From the axis at z = 4 it meets the side at 3, 1, -1, -3, the end at -4.5; n sin 45 > 1 there.
+    assert found.vertices[0, 1:5, 2] == pytest.approx([3, 1, -1, -3], abs=1e-14)
+    assert np.isnan(found.cos_theta_t[0, :5]).all()
+    assert (found.reflectance[0, :5] == 1).all()
+    assert "total" in itinerary(scene, found)
+
+
+def test_a_surface_ends_the_main_way_but_mirrors_and_veils_do_not() -> None:
+    mirror = Surface(Rectangle((0.0, 0.0, -1.0), X, Y, Z, (4.0, 4.0)), Mirror())
+    veil = Surface(
+        Rectangle((0.0, 0.0, 1.0), X, Y, Z, (4.0, 4.0)), Translucent((1.0, 1.0, 1.0), 0.5, 0.2)
+    )
+    scene = Scene(CAMERA, surfaces=(mirror, veil, wall(5.0)))
+    found = follow(scene, [[0.0, 0.0, 3.0]], [[0.0, 0.0, -1.0]], vertices=True)
+    assert found.status[0] == HIT
+    assert found.surface[0] == 2
+    assert found.vertices[0, :5, 2].tolist() == [3, 1, -1, 1, 5]
+    nothing = follow(scene, [[0.0, 0.0, 3.0]], [[0.0, 0.0, -1.0]])
+    assert nothing.solid.shape[0] == nothing.vertices.shape[0] == 0
