@@ -258,7 +258,7 @@ def compound_hit(
     t = 0.0
     inside = _inside_after(rows, first, stretches, t)
     if known_inside and not inside:
-        return 0.0, _left_behind(rows, first, count, stretches), False
+        return 0.0, _left_behind(o, d, rows, first, count, stretches), False
     while True:
         crossing = INF
         for k in range(count):
@@ -301,13 +301,19 @@ def _crossed(rows: Rows, first: int, count: int, stretches: Rows, t: float, ente
 
 
 @inlined
-def _left_behind(rows: Rows, first: int, count: int, stretches: Rows) -> int:
-    """The row of the bound through which a ray has left the solid just before its start."""
+def _left_behind(o: Vec, d: Vec, rows: Rows, first: int, count: int, stretches: Rows) -> int:
+    """The row of the bound through which a ray has left the solid just before its start.
+
+    Along a plane there is no crossing; the ray is then beside it by less than rounding.
+    """
     best, row = -INF, first
     for k in range(count):
-        t = stretches[k, 0 if rows[first + k, HOLLOW] != 0.0 else 1]
+        at = first + k
+        t = stretches[k, 0 if rows[at, HOLLOW] != 0.0 else 1]
+        if rows[at, 0] == PLANE and dot(vec_at(rows, at, 2), d) == 0.0:
+            t = -abs(rows[at, 5] - dot(vec_at(rows, at, 2), o))
         if best < t <= 0.0:
-            best, row = t, first + k
+            best, row = t, at
     return row
 
 

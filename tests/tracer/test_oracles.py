@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.tracer.scenes import Floats, angles, down, glass, one, slab, wall
+from tests.tracer.scenes import Floats, Y, angles, down, glass, one, slab, wall
 from tracer import optics
 from tracer.path import follow
 from tracer.scene import Medium, Scene, Solid
 from tracer.shapes import Sphere
-from tracer.solids import lens
+from tracer.solids import cone, cylinder, difference, intersection, lens, union
 
 EPS = float(np.finfo(float).eps)
 ANGLES = [0.0, 20.0, 45.0, 60.0, 80.0]
@@ -73,14 +73,17 @@ def test_interface_by_colour(degrees: float) -> None:
 
 
 def by_rayoptics(
-    surfaces: list[tuple[float, float, float]], origin: Floats, direction: Floats
+    surfaces: list[tuple[float, ...]], origin: Floats, direction: Floats
 ) -> tuple[Floats, Floats]:
-    """(last point, direction) through (curvature, z, index behind it); their axis is +z."""
+    """(last point, direction) through (curvature, z, index behind it, conic); their axis is +z.
+
+    They know no edges of lenses, no solids, and neither weights nor total reflection.
+    """
     raytrace, surface = oracle("rayoptics.raytr.raytrace"), oracle("rayoptics.elem.surface")
     profiles = oracle("rayoptics.elem.profiles")
     path = []
-    for k, (curvature, z, ior) in enumerate(surfaces):
-        profile = profiles.Spherical(c=curvature)
+    for k, (curvature, z, ior, *conic) in enumerate(surfaces):
+        profile = profiles.Conic(c=curvature, cc=conic[0] if conic else 0.0)
         to_next = surfaces[k + 1][1] - z if k + 1 < len(surfaces) else 0.0
         transform = np.identity(3), np.array([0.0, 0.0, to_next])
         path.append((surface.Surface(profile=profile), None, transform, ior, 1))
@@ -92,7 +95,17 @@ def by_rayoptics(
 FLIP = np.array([1.0, 1.0, -1.0])  # their light goes up +z, ours comes down
 
 
-@pytest.mark.parametrize("name", ["slab", "ball", "lens", "nested"])
+LENSES: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {  # radii, conics
+    "biconvex": ((3.0, -2.0), (0.0, 0.0)),
+    "biconcave": ((-3.0, 2.0), (0.0, 0.0)),
+    "meniscus": ((1.5, 2.2), (0.0, 0.0)),
+    "planohyperbolic": ((math.inf, -2.0), (0.0, -2.25)),
+    "paraboloid, ellipsoid": ((2.0, -2.5), (-1.0, 0.4)),
+    "hollow conics": ((-2.0, 2.5), (-3.0, -0.5)),
+}
+
+
+@pytest.mark.parametrize("name", ["slab", "ball", *LENSES, "doublet", "nested"])
 def test_sequence_by_rayoptics(name: str) -> None:
     n = 1.5
     match name:
@@ -102,10 +115,17 @@ def test_sequence_by_rayoptics(name: str) -> None:
         case "ball":
             scene = glass(Sphere((0.0, 0.0, -1.0), 1.0), n, ends_at=-6.0)
             surfaces = [(1.0, 0.0, n), (-1.0, 2.0, 1.0)]
-        case "lens":
-            solid = lens((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), (3.0, -2.0), 0.8, 0.7)
+        case "doublet":
+            first = lens((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), (3.0, -2.0), 0.8, 0.7)
+            second = lens((0.0, 0.0, -0.8), (0.0, 0.0, -1.0), (-2.0, -6.0), 0.4, 0.7)
+            cemented = Solid(first, Medium(n)), Solid(second, Medium(1.62))
+            scene = Scene(glass(slab(1.0), n).camera, cemented, (wall(-6.0),))
+            surfaces = [(1 / 3.0, 0.0, n), (-1 / 2.0, 0.8, 1.62), (-1 / 6.0, 1.2, 1.0)]
+        case lens_name if lens_name in LENSES:
+            radii, conics = LENSES[lens_name]
+            solid = lens((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), radii, 0.8, 0.7, conics)
             scene = glass(solid, n, ends_at=-6.0)
-            surfaces = [(1 / 3.0, 0.0, n), (-1 / 2.0, 0.8, 1.0)]
+            surfaces = [(1 / radii[0], 0.0, n, conics[0]), (1 / radii[1], 0.8, 1.0, conics[1])]
         case _:
             shell, core = Medium(n), Medium(1.8)
             balls = (
@@ -143,7 +163,7 @@ def by_raysect(primitives: list[Any], origin: Floats, direction: Floats) -> Floa
     return np.array(points)
 
 
-@pytest.mark.parametrize("name", ["ball", "box", "nested"])
+@pytest.mark.parametrize("name", ["ball", "box", "cone", "drilled", "joined", "cut", "nested"])
 def test_solids_by_raysect(name: str) -> None:
     core, optical = oracle("raysect.core"), oracle("raysect.optical")
     primitive, material = oracle("raysect.primitive"), oracle("raysect.optical.material")
@@ -166,6 +186,20 @@ def test_solids_by_raysect(name: str) -> None:
             solids = (Solid(slab(2.0, 1.0, 3.0), shell),)
             corners = core.Point3D(-3, -3, -1), core.Point3D(3, 3, 1)
             theirs = [primitive.Box(*corners, material=dielectric(1.5, 1.0))]
+        case "cone":
+            pointed = cone((0.0, 0.0, 1.0), (0.0, 0.0, -1.0), 1.2, 2.0)
+            solids = (Solid(pointed, shell),)
+            place = core.translate(0, 0, -1)
+            theirs = [primitive.Cone(1.2, 2.0, transform=place, material=dielectric(1.5, 1.0))]
+        case "drilled" | "joined" | "cut":
+            ball, rod = Sphere((0.0, 0.0, 0.0), 1.0), ((0.3, 0.0, 0.0), Y, 0.4, 4.0)
+            ours_is = {"drilled": difference, "joined": union, "cut": intersection}[name]
+            theirs_is = {"drilled": "Subtract", "joined": "Union", "cut": "Intersect"}[name]
+            solids = (Solid(ours_is(ball, cylinder(*rod)), shell),)
+            # Their cylinder begins at the origin, along +z.
+            place = core.translate(0.3, 2.0, 0.0) * core.rotate_x(90)
+            parts = primitive.Sphere(1.0), primitive.Cylinder(0.4, 4.0, transform=place)
+            theirs = [getattr(primitive, theirs_is)(*parts, material=dielectric(1.5, 1.0))]
         case _:
             solids = (
                 Solid(Sphere((0.0, 0.0, 0.0), 1.0), shell),
@@ -175,7 +209,7 @@ def test_solids_by_raysect(name: str) -> None:
                 primitive.Sphere(1.0, material=dielectric(1.5, 1.0)),
                 primitive.Sphere(0.6, material=dielectric(1.8, 1.5)),
             ]
-    path = "TTTT" if name == "nested" else "TT"
+    path = "TTTT" if name in ("nested", "drilled") else "TT"
     scene = Scene(glass(slab(1.0), 1.5).camera, solids, (wall(-6.0),))
     for x, tilt in [(0.1, 0.0), (0.3, 3.0), (-0.5, 8.0)]:
         direction = np.array(down(tilt))

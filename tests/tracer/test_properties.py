@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,22 @@ from hypothesis import strategies as st
 from tests.tracer.scenes import CAMERA, Floats, angles, cube, cube_mesh, glass, prism, wall
 from tracer import optics
 from tracer.image import render
+from tracer.mesh import Mesh
 from tracer.path import HIT, MISS, TIR, follow
 from tracer.scene import Medium, Scene, Solid, Surface, ThinSlab, Transport
 from tracer.shapes import Plane, Quadric, Rectangle, Sphere
-from tracer.solids import Cell, cone, cylinder, lens
+from tracer.solids import (
+    Cell,
+    Compound,
+    Side,
+    Where,
+    cone,
+    cylinder,
+    difference,
+    intersection,
+    lens,
+    union,
+)
 from tracer.vector import Vec, dot, normalise
 
 EPS = float(np.finfo(float).eps)
@@ -30,6 +43,12 @@ SHAPES = {
     "rod": cylinder((0.0, 0.0, 0.0), (0.6, 0.0, 0.8), 0.7, 1.5),
     "cone": cone((0.0, 0.0, 0.9), (0.0, 0.0, -1.0), 0.8, 1.6),
     "lens": lens((0.0, 0.0, 0.3), (0.0, 0.0, -1.0), (1.5, -1.2), 0.6, 0.5),
+    "frustum": cone((0.0, 0.0, 0.9), (0.0, 0.6, -0.8), 0.8, 1.6, 0.3),
+    "biconcave lens": lens((0.0, 0.0, 0.2), (0.0, 0.0, -1.0), (-1.5, 1.2), 0.4, 0.8),
+    "meniscus": lens((0.0, 0.0, 0.3), (0.0, 0.0, -1.0), (1.5, 2.2), 0.6, 0.8, (-1.0, 0.3)),
+    "drilled cube": difference(cube(), cylinder((0.2, 0.1, 0.0), (0.6, 0.0, 0.8), 0.4, 9.0)),
+    "ball on a cube": union(cube(), Sphere((0.0, 0.5, 1.0), 0.6)),
+    "rounded cube": intersection(cube(), Sphere((0.0, 0.0, 0.0), 1.3)),
     "hyperbolic lens": lens((0.0, 0.0, 0.3), (0.0, 0.0, -1.0), (1.5, -1.2), 0.6, 0.5, (-3.0, 0.0)),
 }
 shapes = st.sampled_from(sorted(SHAPES))
@@ -133,17 +152,35 @@ def scaled(shape: object, s: float) -> object:
     def times(v: Vec) -> Vec:
         return s * v[0], s * v[1], s * v[2]
 
+    def bound(b: Plane | Quadric) -> Plane | Quadric:
+        if isinstance(b, Plane):
+            return Plane(b.normal, s * b.offset)
+        return Quadric(times(b.origin), b.axis, s * s * b.a, s * b.b, b.c)
+
+    if isinstance(shape, Mesh):
+        return replace(shape, vertices=s * shape.vertices)
+    assert isinstance(shape, Sphere | Cell | Compound)
+    return mapped(shape, bound, times(shape.center), s * shape.radius)
+
+
+def mapped(
+    shape: Sphere | Cell | Compound,
+    bound: Callable[[Plane | Quadric], Plane | Quadric],
+    center: Vec,
+    radius: float,
+) -> Sphere | Cell | Compound:
+    """The shape with all of its bounds replaced."""
+
+    def of(where: Where) -> Where:
+        if isinstance(where, Side):
+            return replace(where, bound=bound(where.bound))
+        return replace(where, parts=tuple(map(of, where.parts)))
+
     if isinstance(shape, Sphere):
-        return Sphere(times(shape.center), s * shape.radius)
+        return Sphere(center, radius)
     if isinstance(shape, Cell):
-        bounds = tuple(
-            Plane(b.normal, s * b.offset)
-            if isinstance(b, Plane)
-            else Quadric(times(b.origin), b.axis, s * s * b.a, s * b.b, b.c)
-            for b in shape.bounds
-        )
-        return Cell(bounds, times(shape.center), s * shape.radius)
-    return replace(shape, vertices=s * shape.vertices)  # type: ignore[type-var,attr-defined]
+        return Cell(tuple(map(bound, shape.bounds)), center, radius)
+    return Compound(of(shape.where), center, radius)
 
 
 @compiled
@@ -213,21 +250,50 @@ def test_no_ray_is_ever_nan(seed: int) -> None:
     assert (image.pixels + image.cut[:, :, None] >= 1 - 1e-9).all()  # nothing darkens a white world
 
 
+@settings(deadline=None, max_examples=25)
+@given(seeds)
+def test_a_million_rays_through_whatever_overlaps(seed: int) -> None:
+    """Solids anywhere, one inside, beside or across another, and rays that begin anywhere."""
+    rng = np.random.default_rng(seed)
+    names = rng.choice(sorted(SHAPES), 6)
+    solids = tuple(
+        Solid(
+            moved(SHAPES[name], tuple(rng.choice([-0.75, -0.5, 0.0, 0.5, 1.0], 3).tolist())),
+            Medium(float(rng.uniform(0.5, 3))),
+            priority=k,
+        )
+        for k, name in enumerate(names)
+    )
+    scene = Scene(CAMERA, solids, (wall(-5.0),), transport=Transport(60, 0.0))
+    origins, directions = rays_at(rng, 40_000)
+    # Some along the axes and from within, where planes, corners and axes of the shapes are.
+    origins[:4000] = rng.choice([-0.5, 0.0, 0.25, 1.0, 2.0], (4000, 3))
+    directions[1000:9000] = np.eye(3)[rng.integers(0, 3, 8000)] * rng.choice([-1, 1], (8000, 1))
+    found = follow(scene, origins, directions)
+    for numbers in (found.direction, found.weight, found.optical_length):
+        assert np.isfinite(numbers).all()
+    assert np.abs(np.linalg.norm(found.direction, axis=1) - 1).max() <= 60 * 8 * EPS * 9
+    assert ((found.weight >= 0) & (found.weight <= 1)).all()
+    assert (found.optical_length >= 0).all()
+    assert np.isfinite(found.point[found.status == HIT]).all()
+    white = replace(scene, surfaces=(), background=(1.0, 1.0, 1.0), transport=Transport(12, 1e-3))
+    image = render(white, 12, 12)
+    assert np.abs(image.pixels + image.cut[:, :, None] - 1).max() <= 1e-9
+
+
 def moved(shape: object, by: Vec) -> object:
     def plus(v: Vec) -> Vec:
         return v[0] + by[0], v[1] + by[1], v[2] + by[2]
 
-    if isinstance(shape, Sphere):
-        return Sphere(plus(shape.center), shape.radius)
-    if isinstance(shape, Cell):
-        bounds = tuple(
-            Plane(b.normal, b.offset + dot(b.normal, by))
-            if isinstance(b, Plane)
-            else replace(b, origin=plus(b.origin))
-            for b in shape.bounds
-        )
-        return Cell(bounds, plus(shape.center), shape.radius)
-    return replace(shape, vertices=shape.vertices + np.array(by))  # type: ignore[type-var,attr-defined]
+    def bound(b: Plane | Quadric) -> Plane | Quadric:
+        if isinstance(b, Plane):
+            return Plane(b.normal, b.offset + dot(b.normal, by))
+        return replace(b, origin=plus(b.origin))
+
+    if isinstance(shape, Mesh):
+        return replace(shape, vertices=shape.vertices + np.array(by))
+    assert isinstance(shape, Sphere | Cell | Compound)
+    return mapped(shape, bound, plus(shape.center), shape.radius)
 
 
 def test_prism_is_a_solid_of_planes() -> None:
