@@ -171,6 +171,8 @@ def quadric_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[
     z = dot(p, axis)
     # inside is where  qa t^2 + 2 qb t + qc <= 0
     qa = 1.0 - (1.0 + c) * dz * dz
+    if c <= 0.0 and qa < 0.0:
+        qa = 0.0  # along the axis, with a direction that is too long by rounding
     qb = dot(p, d) - ((1.0 + c) * z + 0.5 * b) * dz
     if on_it:
         return 0.0, -2.0 * qb / qa if qa > 0.0 else INF
@@ -255,21 +257,34 @@ def compound_hit(
         else:
             t0, t1 = bound_stretch(o, d, rows, row, number == leaving)
             stretches[k, 0], stretches[k, 1] = t0, t1
-    t = 0.0
-    inside = _inside_after(rows, first, stretches, t)
+    t, inside = 0.0, _inside_after(rows, first, stretches, 0.0)
     if known_inside and not inside:
-        return 0.0, _left_behind(o, d, rows, first, count, stretches), False
+        # Rounding puts the ray beyond a bound that it leaves by, or before one that it came by.
+        t = _changes_at(rows, first, count, stretches, 0.0, False)
+        behind, row = _left_behind(o, d, rows, first, count, stretches)
+        if t >= behind:
+            return 0.0, row, False
+        inside = True
+    t = _changes_at(rows, first, count, stretches, t, inside)
+    if t == INF:
+        return INF, -1, False
+    return t, _crossed(rows, first, count, stretches, t, not inside), not inside
+
+
+@inlined
+def _changes_at(
+    rows: Rows, first: int, count: int, stretches: Rows, t: float, inside: bool
+) -> float:
+    """Where beyond `t` a ray leaves the compound that it is inside of, or else enters it."""
     while True:
         crossing = INF
         for k in range(count):
             for end in range(2):
                 if t < stretches[k, end] < crossing:
                     crossing = stretches[k, end]
-        if crossing == INF:
-            return INF, -1, False
+        if crossing == INF or _inside_after(rows, first, stretches, crossing) != inside:
+            return crossing
         t = crossing
-        if _inside_after(rows, first, stretches, t) != inside:
-            return t, _crossed(rows, first, count, stretches, t, not inside), not inside
 
 
 @inlined
@@ -301,8 +316,10 @@ def _crossed(rows: Rows, first: int, count: int, stretches: Rows, t: float, ente
 
 
 @inlined
-def _left_behind(o: Vec, d: Vec, rows: Rows, first: int, count: int, stretches: Rows) -> int:
-    """The row of the bound through which a ray has left the solid just before its start.
+def _left_behind(
+    o: Vec, d: Vec, rows: Rows, first: int, count: int, stretches: Rows
+) -> tuple[float, int]:
+    """(how far behind, row) of the bound through which a ray has left the solid last.
 
     Along a plane there is no crossing; the ray is then beside it by less than rounding.
     """
@@ -314,7 +331,7 @@ def _left_behind(o: Vec, d: Vec, rows: Rows, first: int, count: int, stretches: 
             t = -abs(rows[at, 5] - dot(vec_at(rows, at, 2), o))
         if best < t <= 0.0:
             best, row = t, at
-    return row
+    return -best, row
 
 
 @inlined

@@ -211,14 +211,21 @@ def test_solids_by_raysect(name: str) -> None:
             ]
     path = "TTTT" if name in ("nested", "drilled") else "TT"
     scene = Scene(glass(slab(1.0), 1.5).camera, solids, (wall(-6.0),))
-    for x, tilt in [(0.1, 0.0), (0.3, 3.0), (-0.5, 8.0)]:
+    # None grazes where it leaves: there the start of their legs would count for much more.
+    aside = -0.05 if name in ("drilled", "cut") else -0.5
+    for x, tilt in [(0.2, 0.0), (0.3, 3.0), (aside, 8.0)]:
         direction = np.array(down(tilt))
         origin = np.array([x, 0.05, 3.0])
         found = follow(scene, [origin], [direction], path, vertices=True)
         points = by_raysect([*theirs, catch], origin, direction)
         ours = found.vertices[0, 1:]
         assert points.shape == ours.shape
-        # They start each leg up to 1e-9 along the normal from where the last one ended.
-        assert np.abs(points - ours).max() <= 2e-8
+        # They start each leg up to 1e-9 along the normal from where the last one ended, and the
+        # rest of the path spreads that, most of all where it leaves at a grazing angle.
+        beside = origin + 1e-6 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        moved = follow(scene, beside, [direction] * 2, path, vertices=True).vertices[:, 1:]
+        spread = max(1.0, np.abs(moved - ours).max() / 1e-6)
+        within = 2e-9 * len(path) * spread
+        assert np.abs(points - ours).max() <= within
         last = (points[-1] - points[-2])[None] / np.linalg.norm(points[-1] - points[-2])
-        assert angles(found.direction, last).max() <= 1e-8
+        assert angles(found.direction, last).max() <= within

@@ -129,6 +129,19 @@ def test_what_has_no_meaning_is_refused(message: str, make: Callable[[], object]
         make()
 
 
+@pytest.mark.parametrize("ulps", [-4, 0, 4])
+def test_along_the_axis_a_direction_may_be_long_by_rounding(ulps: int) -> None:
+    hollow = lens((0.0, 0.0, 0.2), (0.0, 0.0, -1.0), (-1.5, 1.2), 0.4, 0.8)
+    found = follow(
+        glass(hollow, 1.5),
+        [[0.0, 0.0, 1.0]],
+        [[0.0, 0.0, -(1.0 + ulps * np.finfo(float).eps)]],
+        "TT",
+        vertices=True,
+    )
+    assert found.vertices[0, 1:3, 2] == pytest.approx([0.2, -0.2], abs=1e-15)
+
+
 def icosphere(subdivisions: int, smooth: bool) -> Mesh:
     """All vertices on the unit sphere; each triangle becomes four."""
     trimesh = pytest.importorskip("trimesh")
