@@ -25,6 +25,7 @@ NORMAL, ARC = 44.0, 26.0  # lengths of normals and radii of angles
 LETTER, LINE = 6.6, 15.0  # width and height that a letter of a label takes
 FEW = 24  # corners of an outline, at most, whose edges labels avoid
 FAINTEST = 0.25  # opacity of a ray that carries nothing
+RAY = "#d9480f"  # the colour of rays that have none of their own
 TINTS = (1.0, 2.5)  # indices between which a medium's tint deepens
 INK = (
     "svg{color:#1b1f24;background:#fff}"
@@ -89,7 +90,7 @@ class Canvas:
             a, b = self._flat(ends)
             self._line("face", a, b, "#e0a100" if glows else "#8a94a0", 3.5)
 
-    def ray(self, path: RayPath) -> None:
+    def ray(self, path: RayPath, colour: str = RAY) -> None:
         """All legs, each as opaque as it is bright, and an arrow in the middle of what is seen."""
         points = self._flat(self.cut.project(np.array(path.vertices)))
         for a, b, weight in zip(points[:-1], points[1:], path.weights, strict=True):
@@ -98,14 +99,14 @@ class Canvas:
                 continue
             start, end = seen
             opacity = FAINTEST + (1 - FAINTEST) * math.sqrt(min(max(weight, 0.0), 1.0))
-            self._line("ray", start, end, "#d9480f", 1.8, opacity)
+            self._line("ray", start, end, colour, 1.8, opacity)
             if np.linalg.norm(end - start) > 24:
                 u = _unit(end - start)
                 v = np.array([-u[1], u[0]])
                 tip = (start + end) / 2 + 5 * u
                 wings = " ".join(map(_pair, (tip, tip - 10 * u + 3.6 * v, tip - 10 * u - 3.6 * v)))
                 self.elements.append(
-                    f'<polygon points="{wings}" fill="#d9480f" fill-opacity="{opacity:.3f}"/>'
+                    f'<polygon points="{wings}" fill="{colour}" fill-opacity="{opacity:.3f}"/>'
                 )
 
     def angles(self, path: RayPath, k: int) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.record import RayPath
 from harness.scene.resolved import Emissive, ResolvedScene, Vec3
-from harness.section.canvas import Canvas
+from harness.section.canvas import RAY, Canvas
 from harness.section.outline import Cut, Points, Window, outline
 
 NARROWEST = 0.45  # height over width of a drawing; it is never taller than wide
@@ -82,13 +82,15 @@ def draw(
     cut: Cut | None = None,
     window: Window | None = None,
     labels: int = 6,
+    colours: Sequence[str] = (),
     title: str = "",
     standalone: bool = True,
 ) -> str:
     """The section as SVG text.
 
     Without `cut` the plane is fitted to the paths, and without `window` it shows where they bend.
-    The `labels` heaviest interfaces are labelled with their angles. A drawing that is not
+    The `labels` heaviest interfaces are labelled with their angles. With `colours`, each path has
+    its own, as CSS writes colours: light of that wavelength. A drawing that is not
     `standalone` goes into an HTML page and takes its colours from there.
     """
     if cut is None:
@@ -104,8 +106,9 @@ def draw(
         canvas.solid(scene, solid)
     for surface in scene.surfaces:
         canvas.face(surface.shape, glows=isinstance(surface.material, Emissive))
-    for path in sorted(paths, key=lambda p: p.weights[-1]):
-        canvas.ray(path)
+    pairs = zip(paths, colours or [RAY] * len(paths), strict=True)
+    for path, colour in sorted(pairs, key=lambda pair: pair[0].weights[-1]):
+        canvas.ray(path, colour)
     bends = [(path.weights[k], path, k) for path in paths for k in range(len(path.angles))]
     bends.sort(key=lambda bend: -bend[0])
     seen: list[Points] = []

@@ -192,6 +192,16 @@ def test_the_drawn_arc_spans_the_angle() -> None:
     assert spans == pytest.approx([i, r, r, i], abs=1e-3)  # coordinates have two decimals
 
 
+def test_rays_may_have_the_colours_of_their_wavelengths() -> None:
+    world = scene(BALL)
+    paths = [ray_path(world, THROUGH, weights) for weights in ([1.0, 0.9, 0.8], [1.0, 0.2, 0.1])]
+    svg = draw(world, paths, colours=("red", "rgb(0 0 255)"))
+    lines = elements(svg, "line", "ray")  # the weaker first, under the other
+    assert [line.get("stroke") for line in lines] == ["rgb(0 0 255)"] * 3 + ["red"] * 3
+    with pytest.raises(ValueError, match="zip"):
+        draw(world, paths, colours=("red",))
+
+
 def test_weaker_rays_are_fainter() -> None:
     world = scene(BALL)
     svg = draw(world, [ray_path(world, THROUGH, [1.0, 0.25, 0.01])])
