@@ -22,6 +22,9 @@ from harness.renderers.base import (
     RenderSettings,
     Status,
 )
+from harness.renderers.registry import create
+from harness.report import write_report
+from harness.report.links import page_name
 from harness.run import Progress, run
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer
@@ -487,3 +490,19 @@ def test_renderers_are_closed(tmp_path: Path) -> None:
     fakes: list[Renderer] = [Closing("a"), Closing("b")]
     run_tiny(tmp_path, *fakes, cases=["snell"], helper=Closing("helper"))
     assert sorted(closed) == ["a", "b", "helper"]
+
+
+def test_light_that_was_not_followed_is_recorded_and_shown(tmp_path: Path) -> None:
+    """At most what the weight limit lets go at each of the ball's interfaces."""
+    tracer = create("tracer")
+    run_tiny(tmp_path, tracer, student(), cases=["ball*"], helper=tracer)
+    (file,) = (tmp_path / "records").glob("*.json")
+    case = record.read_case(file)
+    cut = {r.name: [i.cut for i in r.images if i.role == "image"] for r in case.runs}
+    (found,) = cut["tracer"]
+    limits = prepared("ball*")[0].scene.transport
+    assert found is not None
+    assert 0 < found < 2 * limits.min_weight * limits.max_depth
+    write_report(tmp_path)
+    (page,) = tmp_path.rglob(page_name(case.id))
+    assert page.read_text("utf-8").count("light not followed") == 1
