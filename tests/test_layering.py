@@ -59,6 +59,7 @@ WORKER_ONLY = TRACER_ADAPTERS | {
     "harness.renderers.mitsuba_lobes",
     "harness.renderers.mitsuba_rays",
     "harness.renderers.mitsuba_sensor",
+    "harness.renderers.mitsuba_world",
 }
 
 # What makes `snellcheck --help` slow, or can abort the process, is imported where it is used.

@@ -37,6 +37,7 @@ from harness.scene import resolved as rs
 from harness.scene.resolved import ResolvedScene
 from harness.translate.mitsuba import describe
 from harness.translate.mitsuba_scale import length_scale, scaled
+from harness.translate.mitsuba_shapes import composed
 
 STOCK_CAPABILITIES = frozenset(
     {
@@ -62,6 +63,10 @@ EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
     Capability.RAYS,
     Capability.PIXEL_CENTRES,
     Capability.LOBE_SWITCH,
+    Capability.LENS,
+    Capability.CONIC,
+    Capability.CONE,
+    Capability.CSG,
 }
 
 # An ordinary image is the mean of this many renders with seeds of their own, which tell its
@@ -125,7 +130,12 @@ class _Engine:
 
         gc.collect()
         dr.set_thread_count(settings.threads)
-        return load(self._mi, describe(scene, settings.samples))
+        without = [k for k, solid in enumerate(scene.solids) if self._is_ours(solid.shape)]
+        return load(self._mi, describe(scene, settings.samples, without))
+
+    def _is_ours(self, _shape: rs.SolidShape) -> bool:
+        """Whether Mitsuba is not told of it."""
+        return False
 
     def _command(self) -> str:
         return f"mitsuba -m {self.variant} scene.xml"
@@ -229,6 +239,10 @@ class ExactEngine(_Engine):
                 f"following both lobes needs Mitsuba's {variants.FAST}, and only {self.variant} "
                 f"works here: {variants.llvm_remedy()}"
             )
+
+    def _is_ours(self, shape: rs.SolidShape) -> bool:
+        """What Mitsuba has no shapes for: `mitsuba_world` finds its boundary."""
+        return composed(shape)
 
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """Radiance at the pixel centres; the same bits in every run and for any threads."""

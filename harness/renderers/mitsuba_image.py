@@ -30,6 +30,7 @@ from harness.renderers.mitsuba_lobes import (
     onward,
     reflected,
 )
+from harness.renderers.mitsuba_world import Met, World
 from harness.scene import resolved as rs
 
 
@@ -67,18 +68,20 @@ def render(live: Any, scene: rs.ResolvedScene, origins: Any, directions: Any) ->
 
     Follows both lobes of every interface to transport.max_depth and transport.min_weight.
     """
-    tables, limits, glow = Tables(live, scene), Limits.of(scene.transport), Glow.of(live, scene)
+    world, limits, glow = World(live, scene), Limits.of(scene.transport), Glow.of(live, scene)
+    tables = world.tables
     Node = _node_type()
 
     def visit(node: Any, stack: Any, waiting: Any, radiance: Any, active: Any) -> tuple[Any, ...]:
-        si = live.ray_intersect(mi.Ray3f(node.origin, node.direction), active)
+        met = world.meet(node.origin, node.direction, active)
+        si = met.si
         # From where the segment begins, which is OFFSET before the ray but at the camera.
         length = si.t + dr.select(node.depth == 1, 0.0, OFFSET)
         node.weight *= attenuation(tables.sigma(node.medium), length)
-        radiance += mi.Color3d(node.weight) * glow.seen(tables, node, si, active)
+        radiance += mi.Color3d(node.weight) * glow.seen(tables, node, met, active)
 
         go = active & si.is_valid() & (node.depth < limits.depth)
-        reflection, through = _children(Node, tables, limits, node, si, go)
+        reflection, through = _children(Node, tables, limits, node, met, go)
         both = (reflection.energy > 0) & (through.energy > 0)
         lighter = reflection.energy < through.energy
         stack.write(dr.select(lighter, through, reflection), waiting, both)
@@ -122,13 +125,13 @@ def _node_type() -> Any:
 
 
 def _children(
-    Node: Any, tables: Tables, limits: Limits, node: Any, si: Any, active: Any
+    Node: Any, tables: Tables, limits: Limits, node: Any, met: Met, active: Any
 ) -> tuple[Any, Any]:
     """What is reflected and what goes on; energy 0 where nothing does or it is to be cut."""
-    bsdf = si.bsdf()
+    si, bsdf, number = met
     reflection = reflected(si, bsdf, active)
     through = onward(si, bsdf, node.direction, active)
-    interface = tables.kind(si, active) == INTERFACE
+    interface = tables.kind(number, active) == INTERFACE
     total = through.energy <= 0
     follow_reflection = active & (limits.reflection | total | ~interface)
     follow_through = active & (limits.transmission | ~interface)
@@ -142,7 +145,7 @@ def _children(
             weight=node.weight * lobe.weight,
             energy=dr.select(follow & (energy >= limits.energy), energy, 0),
             depth=node.depth + 1,
-            medium=tables.medium_beyond(si, lobe.direction, node.medium, active),
+            medium=tables.medium_beyond(number, si, lobe.direction, node.medium, active),
         )
 
     return child(reflection, follow_reflection), child(through, follow_through)
@@ -166,15 +169,16 @@ class Glow:
         ]
         return cls(live, lights, Code.of(scene))
 
-    def seen(self, tables: Tables, node: Any, si: Any, active: Any) -> Any:
+    def seen(self, tables: Tables, node: Any, met: Met, active: Any) -> Any:
         """Radiance (Color3d) that leaves `si` towards the ray, or comes from the background."""
+        si, _, number = met
         radiance = mi.Color3d(si.emitter(self.live, active).eval(si, active))
         hit = active & si.is_valid()
         if self.code is not None:
             coded = (
                 hit
-                & (tables.kind(si, hit) == SURFACE)
-                & (tables.index(si, hit) == self.code.surface)
+                & (tables.kind(number, hit) == SURFACE)
+                & (tables.index(number, hit) == self.code.surface)
                 & (mi.Frame3f.cos_theta(si.wi) > 0)
             )
             radiance = dr.select(coded, self.code.radiance(landing(node, si)), radiance)

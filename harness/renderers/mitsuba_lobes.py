@@ -5,6 +5,7 @@ Imported only in the process that hosts Mitsuba, after an LLVM variant was chose
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,13 +24,18 @@ SURFACE, INTERFACE = 0, 1
 class Tables:
     """What a hit shape is, by Mitsuba's number of it: facts that BSDFs do not tell.
 
-    `scene` is the (scaled) scene from which `live` was made.
+    `scene` is the (scaled) scene from which `live` was made. Solids `without` are not in `live`,
+    and have the numbers from `first` on.
     """
 
-    def __init__(self, live: Any, scene: rs.ResolvedScene) -> None:
+    def __init__(self, live: Any, scene: rs.ResolvedScene, without: Sequence[int] = ()) -> None:
         numbers = np.array(dr.reinterpret_array(mi.UInt32, live.shapes_dr()))
-        size = int(numbers.max(initial=0)) + 1
-        kind, index, inside, outside = np.zeros((4, size), np.uint32)
+        self.first = int(numbers.max(initial=0)) + 1
+        kind, index, inside, outside = np.zeros((4, self.first + len(without)), np.uint32)
+        for number, k in enumerate(without, self.first):
+            solid = scene.solids[k]
+            kind[number], index[number] = INTERFACE, k
+            inside[number], outside[number] = solid.medium, solid.exterior
         for number, shape in zip(numbers, live.shapes(), strict=True):
             role, k = shape.id().split("_")[:2]
             index[number] = int(k)
@@ -43,30 +49,25 @@ class Tables:
         self._sigma = [mi.Float(column) for column in absorption.T]
         self._ior = mi.Float(np.array([m.ior for m in scene.media], np.float32))
 
-    def kind(self, si: Any, active: Any) -> Any:
-        return dr.gather(mi.UInt32, self._kind, self._number(si), active)
+    def kind(self, number: Any, active: Any) -> Any:
+        return dr.gather(mi.UInt32, self._kind, number, active)
 
-    def index(self, si: Any, active: Any) -> Any:
+    def index(self, number: Any, active: Any) -> Any:
         """Index into scene.surfaces or scene.solids."""
-        return dr.gather(mi.UInt32, self._index, self._number(si), active)
+        return dr.gather(mi.UInt32, self._index, number, active)
 
-    def medium_beyond(self, si: Any, direction: Any, current: Any, active: Any) -> Any:
+    def medium_beyond(self, number: Any, si: Any, direction: Any, current: Any, active: Any) -> Any:
         """The medium that a ray is in that leaves `si` along `direction`."""
-        number = self._number(si)
         inside = dr.gather(mi.UInt32, self._inside, number, active)
         outside = dr.gather(mi.UInt32, self._outside, number, active)
         entered = dr.select(dr.dot(direction, si.n) < 0, inside, outside)
-        return dr.select(self.kind(si, active) == INTERFACE, entered, current)
+        return dr.select(self.kind(number, active) == INTERFACE, entered, current)
 
     def sigma(self, medium: Any) -> Any:
         return mi.Color3f(*(dr.gather(mi.Float, column, medium) for column in self._sigma))
 
     def ior(self, medium: Any) -> Any:
         return dr.gather(mi.Float, self._ior, medium)
-
-    @staticmethod
-    def _number(si: Any) -> Any:
-        return dr.reinterpret_array(mi.UInt32, si.shape)
 
 
 @dataclass  # not frozen: dr.select fills in its result

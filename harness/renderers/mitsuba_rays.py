@@ -16,11 +16,11 @@ from harness.renderers.base import RayPaths, Rays, Status
 from harness.renderers.mitsuba_lobes import (
     INTERFACE,
     OFFSET,
-    Tables,
     landing,
     onward,
     reflected,
 )
+from harness.renderers.mitsuba_world import World
 from harness.scene import resolved as rs
 
 
@@ -29,25 +29,26 @@ def trace(live: Any, scene: rs.ResolvedScene, rays: Rays, path: str) -> RayPaths
 
     HIT is a ray that lands on a surface after its last letter, MISS also one that lands before.
     """
-    tables = Tables(live, scene)
+    world = World(live, scene)
+    tables = world.tables
     reflects = mi.Bool(np.array([*(letter == "R" for letter in path), False]))
     letters = dr.opaque(mi.UInt32, min(len(path), scene.transport.max_depth - 1))
     complete = dr.opaque(mi.Bool, len(path) < scene.transport.max_depth)
     n = len(rays.origins)
 
     def step(k: Any, ray: Any, active: Any) -> tuple[Any, ...]:
-        si = live.ray_intersect(mi.Ray3f(ray.origin, ray.direction), active)
+        si, bsdf, number = world.meet(ray.origin, ray.direction, active)
         hit = active & si.is_valid()
-        interface = hit & (tables.kind(si, hit) == INTERFACE)
+        interface = hit & (tables.kind(number, hit) == INTERFACE)
         length = mi.Float64(si.t) + dr.select(k == 0, 0.0, OFFSET)
         ray.optical_length += dr.select(hit, length * mi.Float64(tables.ior(ray.medium)), 0.0)
         ray.point = dr.select(hit, landing(ray, si), ray.point)
 
         last = hit & (k >= letters)
         landed = last & ~interface & complete
-        ray.surface = dr.select(landed, mi.Int32(tables.index(si, hit)), -1)
+        ray.surface = dr.select(landed, mi.Int32(tables.index(number, hit)), -1)
         going = hit & ~last
-        bsdf, back = si.bsdf(), dr.gather(mi.Bool, reflects, k, going)
+        back = dr.gather(mi.Bool, reflects, k, going)
         lobe = dr.select(back, reflected(si, bsdf, going), onward(si, bsdf, ray.direction, going))
         go = going & ((lobe.energy > 0) | (interface & back))
         ray.status = dr.select(
@@ -57,7 +58,7 @@ def trace(live: Any, scene: rs.ResolvedScene, rays: Rays, path: str) -> RayPaths
         )
 
         point = dr.fma(si.t, ray.direction, ray.origin)
-        medium = tables.medium_beyond(si, lobe.direction, ray.medium, go)
+        medium = tables.medium_beyond(number, si, lobe.direction, ray.medium, go)
         ray.origin = dr.select(go, dr.fma(OFFSET, lobe.direction, point), ray.origin)
         ray.direction = dr.select(go, lobe.direction, ray.direction)
         ray.medium = dr.select(go, medium, ray.medium)

@@ -18,6 +18,7 @@ medium), and diffuse surfaces are lit by emissive ones too, not by point lights 
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 
 import numpy as np
 
@@ -35,11 +36,13 @@ NEAR_CLIP = 1e-4
 FAR_CLIP = 1e6
 
 
-def describe(scene: rs.ResolvedScene, samples: int = 64) -> Node:
+def describe(
+    scene: rs.ResolvedScene, samples: int = 64, without: Container[int] = frozenset()
+) -> Node:
     """The scene as a Mitsuba description, in lengths multiplied by `length_scale(scene)`.
 
-    `samples` per pixel are what the written scene asks for. Raises RendererUnsupported where
-    Mitsuba has no counterpart.
+    `samples` per pixel are what the written scene asks for. Solids of the indices `without` are
+    left to whoever follows the rays. Raises RendererUnsupported where Mitsuba has no counterpart.
     """
     scene = scaled(scene, length_scale(scene))
     node: Node = {
@@ -49,6 +52,8 @@ def describe(scene: rs.ResolvedScene, samples: int = 64) -> Node:
     }
     node |= {f"medium_{k}": _medium(m) for k, m in enumerate(scene.media) if any(m.absorption)}
     for k, solid in enumerate(scene.solids):
+        if k in without:
+            continue
         boundary = _boundary(scene, solid)
         for part, shape in parts(solid.shape):
             node[f"solid_{k}{part}"] = {**shape, **boundary}
@@ -148,18 +153,21 @@ def _reference(medium: int) -> Node:
     return {"type": "ref", "id": f"medium_{medium}"}
 
 
-def _boundary(scene: rs.ResolvedScene, solid: rs.Solid) -> Node:
-    """The interface between a solid's medium and its exterior, one surface for both.
+def interface(scene: rs.ResolvedScene, solid: rs.Solid) -> Node:
+    """The BSDF between a solid's medium and its exterior.
 
     `ext_ior` is always said, because Mitsuba's default is air, 1.000277.
     """
-    node: Node = {
-        "bsdf": {
-            "type": "dielectric",
-            "int_ior": scene.media[solid.medium].ior,
-            "ext_ior": scene.media[solid.exterior].ior,
-        }
+    return {
+        "type": "dielectric",
+        "int_ior": scene.media[solid.medium].ior,
+        "ext_ior": scene.media[solid.exterior].ior,
     }
+
+
+def _boundary(scene: rs.ResolvedScene, solid: rs.Solid) -> Node:
+    """The interface of a solid, one surface for both of its sides, and the media there."""
+    node: Node = {"bsdf": interface(scene, solid)}
     if any(scene.media[solid.medium].absorption):
         node["interior"] = _reference(solid.medium)
     if any(scene.media[solid.exterior].absorption):

@@ -30,6 +30,11 @@ def affine(x: Any, y: Any, z: Any, origin: Any) -> Matrix:
     return rows
 
 
+def composed(shape: rs.SolidShape) -> bool:
+    """Whether Mitsuba has no shapes that make it up."""
+    return isinstance(shape, rs.Cone | rs.Lens | rs.Csg)
+
+
 def parts(shape: rs.SolidShape | rs.SurfaceShape) -> Iterator[tuple[str, Node]]:
     """Mitsuba shapes that make up `shape`, each with a suffix for its name."""
     match shape:
