@@ -317,6 +317,29 @@ def test_paraxial_focus_of_a_ball(row: Row) -> None:
     assert traced_focus(h, radius, ior) == pytest.approx(float(row.v[0]), rel=1e-8)
 
 
+@each("ball_mag")
+def test_image_of_a_ball(row: Row) -> None:
+    """Two rays from a point beside the axis meet again in its image, which may be a virtual one."""
+    distance, radius, ior = numbers(row.p)
+    image_distance, magnification = numbers(row.v)
+    h = 1e-4 * radius
+    lines = []
+    for aim in (-h, h):
+        d = normalise((aim - h, 0.0, -distance))
+        scene = glass(Sphere((0.0, 0.0, 0.0), radius), ior, ends_at=-3 * radius)
+        found = one(scene, (h, 0.0, distance), d, "TT")
+        p, d = found.vertices[0, 2], found.direction[0]
+        lines.append((p[0] - d[0] / d[2] * p[2], d[0] / d[2]))
+    (x0, slope0), (x1, slope1) = lines
+    z = (x0 - x1) / (slope1 - slope0)
+    # Rays are up to 2 h from the axis; aberration moves 1 / f by no more than (2 h / R)^2 of it,
+    # and the image by |s2| / f times that.
+    focal = ior * radius / (2 * (ior - 1))
+    allowed = 4e-8 * max(1.0, abs(image_distance) / focal)
+    assert -z == pytest.approx(image_distance, rel=allowed)
+    assert (x0 + slope0 * z) / h == pytest.approx(magnification, rel=allowed)
+
+
 @each("ball_view")
 def test_view_through_a_ball(row: Row) -> None:
     phi, a, b, radius, ior = numbers(row.p)
