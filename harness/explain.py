@@ -7,15 +7,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from harness import plan
-from harness.camera import primary_rays
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
 from harness.diagnosis.whole_run import Witness, diagnose_run
 from harness.errors import ImageNotFinite
 from harness.measure.comparison import Unmeasurable
 from harness.measure.images import Pixels
-from harness.measure.observables import Observable
-from harness.measure.probe_truth import ProbeTruth
+from harness.measure.observables import DIRECTION_OBSERVABLES, Observable
+from harness.measure.precision import Precision
+from harness.measure.probe_truth import ProbeTruth, probe_truth
 from harness.measure.rays import RayMeasurement
 from harness.plan import PreparedCase
 from harness.record import Cause, Check, Diagnosis, SummaryCase, Verdict
@@ -24,7 +24,6 @@ from harness.results import FAILED_PREFLIGHT, Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolve import expand_thin_slabs
 from harness.scene.resolved import ThinSlab
-from harness.truth import ClosedForm
 
 OFF = (Verdict.FAIL, Verdict.KNOWN, Verdict.ERROR)
 
@@ -90,11 +89,15 @@ class Explainer:
 # Of the cases in which a renderer is right, as many are asked what they say against a cause.
 MOST_WITNESSES = 24
 WITNESS_RAYS = 48
-# A renderer that passed deviates by less than its tolerances: as a rule, by less than these.
 BOUNDARIES = {
     Observable.TIR, Observable.CRITICAL_ANGLE, Observable.FIRST_TRANSMITTING_ANGLE
 }  # fmt: skip
+# A renderer that passed deviates by less than its tolerances: as a rule by less than these, and
+# by less than the errors of single precision, which grow near a critical angle.
 POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
+# Of a plane's size: so far aside may a ray be where all checks look at its direction.
+UNSAID = 0.01
+SINGLE = Precision(float(np.finfo(np.float32).eps), float(np.finfo(np.float32).eps))
 
 
 def explain_run(
@@ -112,8 +115,31 @@ def explain_run(
         by_case = {c.id: d for c in judged for d in c.diagnoses if d.renderer == renderer}
         if by_case:
             witnesses = list(_witnesses(cases, judged, renderer))
-            found += diagnose_run(renderer, by_case, witnesses)
+            found += [
+                as_documented(diagnosis, judged)
+                for diagnosis in diagnose_run(renderer, by_case, witnesses)
+            ]
     return found
+
+
+def as_documented(diagnosis: Diagnosis, judged: Sequence[SummaryCase]) -> Diagnosis:
+    """A diagnosis that found no cause says the scenes' own where they document all that is off."""
+    off = [
+        check
+        for case in judged
+        if case.id in diagnosis.unexplained
+        for check in case.checks
+        if check.renderer == diagnosis.renderer and check.against == "truth" and check.status in OFF
+    ]
+    if diagnosis.cause is not None or not off or any(c.status is not Verdict.KNOWN for c in off):
+        return diagnosis
+    causes = "; ".join(dict.fromkeys(check.cause for check in off))
+    n = len(diagnosis.unexplained)
+    sentence = (
+        f"{diagnosis.renderer} deviates in {n} case{'s' * (n > 1)} as documented, which none of "
+        f"the known causes alone explains: {causes}"
+    )
+    return diagnosis.model_copy(update={"sentence": sentence})
 
 
 def explain_preflight(name: str, findings: str) -> Diagnosis:
@@ -173,23 +199,28 @@ def _measuring(case: PreparedCase) -> list[model.Probe]:
     ]
 
 
+def _only_directions(case: PreparedCase, probe: model.Probe) -> bool:
+    used = {c.observable for c in case.loaded.model.checks if c.probe == probe.name}
+    return used <= DIRECTION_OBSERVABLES | BOUNDARIES
+
+
 def _truth_as_evidence(case: PreparedCase, probe: model.Probe) -> Evidence:
-    scene, planes = expand_thin_slabs(case.scene), case.planes(probe)
-    every = primary_rays(scene)
-    rows = np.linspace(0, len(every.origins) - 1, WITNESS_RAYS * 8).astype(int)
-    form = ClosedForm(scene)
-    paths = form.follow(Rays(every.origins[rows], every.directions[rows]), probe.path)
-    on = [form.land(paths, plane) for plane in planes]
-    lands = np.all([landing.status == Status.HIT for landing in on], axis=0)
-    kept = np.flatnonzero(lands)
+    truth = probe_truth(expand_thin_slabs(case.scene), probe.path, case.planes(probe))
+    lands = np.all([landing.status == Status.HIT for landing in truth.landings], axis=0)
+    kept = np.flatnonzero(lands & ~truth.grazing)
     kept = kept[np.linspace(0, len(kept) - 1, min(WITNESS_RAYS, len(kept))).astype(int)]
-    rays = Rays(every.origins[rows[kept]], every.directions[rows[kept]])
-    setting = Setting(scene, rays, rows[kept], probe.path, planes)
-    many = np.ones(len(kept))
+    rays = Rays(truth.rays.origins[kept], truth.rays.directions[kept])
+    setting = Setting(truth.scene, rays, kept, probe.path, truth.planes)
     if probe.measure == "light":
-        level = paths.weight[kept, None] * on[0].transmission[kept]
-        return Levels(setting, level, np.full_like(level, LEVEL_TOLERANCE))
+        level = truth.level[kept]
+        tolerance = np.maximum(truth.level_tolerance(SINGLE)[kept, None], LEVEL_TOLERANCE)
+        return Levels(setting, level, np.broadcast_to(tolerance, level.shape))
+    size = max(max(plane.size) for plane in truth.planes)
+    unsaid = UNSAID * size if _only_directions(case, probe) else POINT_TOLERANCE
     return Landings(
-        setting, on[0].point[kept], paths.direction[kept] if len(planes) == 2 else None,
-        np.ones(len(kept), bool), POINT_TOLERANCE * many, DIRECTION_TOLERANCE * many,
+        setting, truth.landings[0].point[kept],
+        truth.paths.direction[kept] if len(truth.planes) == 2 else None,
+        np.ones(len(kept), bool),
+        np.maximum(truth.point_tolerance(SINGLE)[kept], unsaid),
+        np.maximum(truth.direction_tolerance(SINGLE)[kept], DIRECTION_TOLERANCE),
     )  # fmt: skip

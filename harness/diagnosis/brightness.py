@@ -137,6 +137,22 @@ def _constant(world: World, a: Values) -> World:
     return world.with_law(reflectance=reflectance)
 
 
+def _clear_inner_exit(world: World, _: Values) -> World:
+    """No reflection where a ray leaves a solid that lies within another."""
+    surroundings, law = world.scene.media[0].ior, world.law
+
+    def reflectance(at: Interface) -> Float:
+        inner = ~at.entering & (np.abs(at.ior_t - surroundings) > 1e-9)
+        _, _, total = _polarised(at)
+        return np.where(inner & ~total, 0.0, law.reflectance(at))
+
+    return world.with_law(reflectance=reflectance)
+
+
+def _nested(world: World) -> bool:
+    return any(solid.exterior for solid in world.scene.solids)
+
+
 def _transmission_power(world: World, a: Values) -> World:
     return world.with_law(transmittance=lambda _, R: np.maximum(1 - R, 0) ** a[0])
 
@@ -304,6 +320,10 @@ BRIGHTNESS = (
         "fresnel-fixed", _fresnel_fixed,
         lambda f: f"weighs light by the Fresnel factors of n = {f}, whatever the scene says",
         ((1.1,), (1.5,)), "n", kin="fresnel-index",
+    ),
+    Hypothesis(
+        "inner-exit-clear", _clear_inner_exit,
+        says("reflects nothing where a ray leaves an inner solid"), applies=_nested,
     ),
     Hypothesis(
         "rs-denominator", _half_denominator,

@@ -241,12 +241,15 @@ def _has_mesh(world: World) -> bool:
     return any(isinstance(solid.shape, Mesh) for solid in world.scene.solids)
 
 
-def _spawned(world: World, a: Values, relative: bool) -> World:
-    """Rays start off the surface, along its normal, on the side to which they go."""
+def _spawned(world: World, a: Values, fixed: float, growing: float) -> World:
+    """Rays start off the surface, along its normal, on the side to which they go.
+
+    By a[0] times (fixed + growing times the largest coordinate).
+    """
 
     def start(at: Interface, d: Float) -> Float:
         side = np.sign(np.einsum("ij,ij->i", d, at.n))[:, None] * at.n
-        size = 1 + np.abs(at.point).max(axis=1, keepdims=True) if relative else 1.0
+        size = fixed + growing * np.abs(at.point).max(axis=1, keepdims=True)
         return np.asarray(at.point + a[0] * size * side)
 
     return world.with_law(start=start)
@@ -361,15 +364,23 @@ REFRACTION = (
     ),
     *(_stretched_normals(axis) for axis in range(3)),
     Hypothesis(
-        "spawn-normal", lambda w, a: _spawned(w, a, False),
+        "spawn-normal", lambda w, a: _spawned(w, a, 1, 0),
         lambda f: f"starts rays {f} units off the surface along its normal, not where they hit",
-        ((1e-4,), (1e-3,), (1e-2,)), "offset", "units", kin="spawn",
+        ((1e-4,), (1e-3,), (1e-2,), (1e-6,), (1e-8,)), "offset", "units",
+        kin="spawn",
     ),
     Hypothesis(
-        "spawn-normal-relative", lambda w, a: _spawned(w, a, True),
+        "spawn-normal-relative", lambda w, a: _spawned(w, a, 1, 1),
         lambda f: "starts rays off the surface along its normal, not where they hit, by "
         f"{f} (1 + the largest coordinate)",
         ((1e-4,), (1e-3,)), "relative offset", kin="spawn",
+    ),
+    Hypothesis(
+        # The same of a renderer whose unit of length is a[1] of the scene's.
+        "spawn-normal-scaled", lambda w, a: _spawned(w, a, a[1], 1),
+        lambda f: "starts rays off the surface along its normal, not where they hit, by "
+        f"{f} ({f.values[1]:.2g} + the largest coordinate)",
+        tuple((1e-4, 10.0**k) for k in (-6, -4, -2)), "relative offset", kin="spawn",
     ),
     Hypothesis(
         "index-fixed", _fixed_index,

@@ -17,7 +17,7 @@ from harness.diagnosis.choose import SAME, akin, complexity, first_of_kin, no_ca
 from harness.diagnosis.evidence import Evidence
 from harness.diagnosis.fit import cost_of
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
-from harness.diagnosis.library import LIBRARY
+from harness.diagnosis.library import BY_ID, LIBRARY
 from harness.record import Cause, CauseFit, Diagnosis
 
 # Of a case's gain by its own best parameter, so much may be lost by the common one.
@@ -61,8 +61,13 @@ def diagnose_run(
         best = ranked[0]
         if len(best.explained) < CONVINCING * len(left):
             break
-        found.append(_as_diagnosis(renderer, left, ranked))
-        left = {case: d for case, d in left.items() if case not in best.explained}
+        varied = [
+            case
+            for case, d in left.items()
+            if case not in best.explained and _shows(best.hypothesis, d)
+        ]
+        found.append(_as_diagnosis(renderer, left, ranked, varied))
+        left = {case: d for case, d in left.items() if case in found[-1].unexplained}
     if left:
         found.append(_nothing(renderer, left, found))
     return found
@@ -75,6 +80,14 @@ def _ranked(left: Mapping[str, Diagnosis], witnesses: Sequence[Witness]) -> list
     return first_of_kin(held, lambda c: c.total, lambda c: c.hypothesis)
 
 
+def _shows(hypothesis: Hypothesis, diagnosis: Diagnosis) -> bool:
+    """Whether the case, taken alone, is best explained by the hypothesis or one of its kin."""
+    named = [(fit, BY_ID[fit.id]) for fit in diagnosis.fits if fit.id]
+    cost = {h.id: fit.score + complexity(h, diagnosis.rays) for fit, h in named}
+    least = min(cost.values())
+    return any(fit.fits and akin(h, hypothesis) and cost[h.id] <= least + SAME for fit, h in named)
+
+
 def _fit_of(diagnosis: Diagnosis, name: str) -> CauseFit:
     """What the case says of a hypothesis: as much as of truth where it does not concern it."""
     by_id = {fit.id: fit for fit in diagnosis.fits}
@@ -83,41 +96,71 @@ def _fit_of(diagnosis: Diagnosis, name: str) -> CauseFit:
 
 def _common(hypothesis: Hypothesis, left: Mapping[str, Diagnosis]) -> _Common:
     fits = {case: _fit_of(d, hypothesis.id) for case, d in left.items()}
-    concerned = [f for f in fits.values() if f.id and f.fits]
-    values, error = _joint(hypothesis, concerned)
+    values, error = _joint(hypothesis, left, fits)
     costs, explained = {}, []
     for case, fit in fits.items():
-        n, truth = left[case].rays, _fit_of(left[case], "").score
-        moved = fit.values[0] - values[0] if fit.values and values else 0.0
-        lost = n / 2 * np.log1p(fit.information * moved**2 / n)
-        if fit.values and not hypothesis.continuous:
-            steps = [start[0] for start in hypothesis.starts]
-            lost = 0.0 if steps.index(fit.values[0]) <= steps.index(values[0]) else truth
+        truth = _fit_of(left[case], "").score
+        lost = _lost(hypothesis, fit, values, left[case].rays, truth)
         costs[case] = min(fit.score + lost, truth)
-        if fit.id and fit.fits and lost <= SAME + LOST * (truth - fit.score):
+        if _explains(fit, lost, truth):
             explained.append(case)
     rays = sum(d.rays for d in left.values())
     total = sum(costs.values()) + complexity(hypothesis, rays)
     return _Common(hypothesis, values, error, costs, tuple(explained), float(total))
 
 
-def _joint(hypothesis: Hypothesis, fits: Sequence[CauseFit]) -> tuple[Values, float]:
-    """The mean of the cases' parameters, weighted by how sharply each knows its own.
-
-    Of parameters that come in steps the most harmful: each case has the most harmless one that
-    explains it. The error is two standard errors,
-    or the cases' own scatter where that is larger.
-    """
-    if not hypothesis.size or not fits:
-        return hypothesis.starts[0], 0.0
-    first = [fit.values[0] for fit in fits]
+def _lost(hypothesis: Hypothesis, fit: CauseFit, values: Values, rays: int, truth: float) -> float:
+    """What a case's cost grows by where `values` take the place of its own."""
+    if not fit.values or not values:
+        return 0.0
     if not hypothesis.continuous:
         steps = [start[0] for start in hypothesis.starts]
-        return (max(first, key=steps.index),), 0.0
-    weights = np.array([max(fit.information, 1e-300) for fit in fits])
-    rest = max(fits, key=lambda f: f.information).values[1:]
+        return 0.0 if steps.index(fit.values[0]) <= steps.index(values[0]) else truth
+    moved = fit.values[0] - values[0]
+    return float(rays / 2 * np.log1p(fit.information * moved**2 / rays))
+
+
+def _explains(fit: CauseFit, lost: float, truth: float) -> bool:
+    return bool(fit.id) and fit.fits and lost <= SAME + LOST * (truth - fit.score)
+
+
+def _joint(
+    hypothesis: Hypothesis, left: Mapping[str, Diagnosis], fits: Mapping[str, CauseFit]
+) -> tuple[Values, float]:
+    """One parameter for the cases, and its error.
+
+    Of parameters that come in steps the most harmful: each case has the most harmless one that
+    explains it. Of others that of the case by which all cases together cost least, since a case
+    with a second fault knows its own wrong one sharply; and then the mean over all cases that this
+    explains, weighted by how sharply each knows its own. The error is two standard errors, or the
+    cases' own scatter where that is larger.
+    """
+    concerned = {case: fit for case, fit in fits.items() if fit.id and fit.fits}
+    if not hypothesis.size or not concerned:
+        return hypothesis.starts[0], 0.0
+    if not hypothesis.continuous:
+        steps = [start[0] for start in hypothesis.starts]
+        return (max((fit.values[0] for fit in concerned.values()), key=steps.index),), 0.0
+    truth = {case: _fit_of(left[case], "").score for case in concerned}
+
+    def lost(case: str, values: Values) -> float:
+        return _lost(hypothesis, concerned[case], values, left[case].rays, truth[case])
+
+    def cost(leader: CauseFit) -> float:
+        return sum(
+            min(fit.score + lost(case, tuple(leader.values)), truth[case])
+            for case, fit in concerned.items()
+        )
+
+    best = tuple(min(concerned.values(), key=cost).values)
+    agreed = [
+        fit for case, fit in concerned.items() if _explains(fit, lost(case, best), truth[case])
+    ]
+    weights = np.array([max(fit.information, 1e-300) for fit in agreed])
+    first = np.array([fit.values[0] for fit in agreed])
+    rest = max(agreed, key=lambda f: f.information).values[1:]
     mean = float(np.average(first, weights=weights))
-    spread = np.sqrt(np.average((np.array(first) - mean) ** 2, weights=weights) / len(fits))
+    spread = np.sqrt(np.average((first - mean) ** 2, weights=weights) / len(agreed))
     return (mean, *rest), 2 * float(max(weights.sum() ** -0.5, spread))
 
 
@@ -138,22 +181,28 @@ def _held_against(common: _Common, witnesses: Sequence[Witness]) -> _Common:
 
 
 def _as_diagnosis(
-    renderer: str, left: Mapping[str, Diagnosis], ranked: Sequence[_Common]
+    renderer: str,
+    left: Mapping[str, Diagnosis],
+    ranked: Sequence[_Common],
+    varied: Sequence[str],
 ) -> Diagnosis:
+    """`varied` are cases that show the same with a size of their own."""
     best = ranked[0]
     mine = {case: left[case] for case in best.explained}
     iors = tuple(sorted({n for d in mine.values() for n in d.iors}))
     cause, second = _cause(best, mine, iors), _next(ranked)
-    other = [case for case in left if case not in best.explained]
+    other = [case for case in left if case not in best.explained and case not in varied]
     sentence = f"{renderer} {cause.sentence}"
     if len(left) > 1:
         sentence += f": this explains {len(mine)} of {len(left)} cases that are off"
+    if varied:
+        sentence += f", and with a size of their own {len(varied)} more"
     if best.broken:
         sentence += f", but it should show in {best.broken[0]}, too, where nothing is off"
     return Diagnosis(
         renderer=renderer, sentence=sentence, cause=cause, runner_up=_cause(second, mine, iors),
         deviation=_deviation(mine), rays=sum(d.rays for d in mine.values()),
-        iors=list(iors), cases=list(mine), unexplained=other,
+        iors=list(iors), cases=[*mine, *varied], unexplained=other,
     )  # fmt: skip
 
 

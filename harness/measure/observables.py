@@ -130,3 +130,15 @@ TRUTH_OBSERVABLES = frozenset(Observable) - IMAGE_OBSERVABLES | {Observable.RADI
 
 # Observables that follow from others and are not asked for by name.
 IMPLIED_OBSERVABLES = frozenset({Observable.VARIANT_AGREEMENT})
+
+# Observables of a probe that look at directions alone: where a ray runs beside itself passes them.
+DIRECTION_OBSERVABLES = frozenset(
+    {
+        Observable.EXIT_DIRECTION,
+        Observable.DEVIATION,
+        Observable.MINIMUM_DEVIATION,
+        Observable.FOLDED_DIRECTION,
+        Observable.REVERSIBILITY,
+        Observable.RAINBOW_ANGLE,
+    }
+)

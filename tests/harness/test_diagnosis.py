@@ -15,8 +15,9 @@ from harness.diagnosis.hypothesis import plus_minus
 from harness.diagnosis.library import BY_ID, LIBRARY
 from harness.diagnosis.whole_run import Witness, diagnose_run
 from harness.diagnosis.worlds import World
+from harness.explain import as_documented
 from harness.plan import prepare
-from harness.record import Diagnosis, Summary
+from harness.record import Diagnosis, Summary, Verdict
 from harness.renderers.base import Rays, Status
 from harness.scene.load import find
 from harness.scene.resolve import expand_thin_slabs
@@ -221,6 +222,52 @@ def test_two_faults_are_two_diagnoses() -> None:
     found = diagnose_run("it", known, [])
     assert {d.cause.id for d in found if d.cause} == {"exit-straight", "polarisation"}
     assert {tuple(d.cases) for d in found} == {("slab",), ("light",)}
+
+
+def test_a_case_that_knows_another_size_sharply_does_not_spoil_the_common_one() -> None:
+    noise = np.random.default_rng(6)
+    sizes = {"snell": -0.01, "slab-offset*0.25*": -0.01, "slab-offset*=1*": 0.02}
+    by_case = {}
+    for case, size in sizes.items():
+        asked = setting(case)
+        wrong = BY_ID["index"].world(World.right(asked), (size,))
+        by_case[case] = diagnose("it", [shown_by(wrong, False, noise)])
+    known = {case: d for case, d in by_case.items() if d is not None}
+    (sharp,) = (f for f in known["slab-offset*=1*"].fits if f.id == "index")
+    sharper = sharp.model_copy(update={"information": 1e6 * sharp.information})
+    fits = [sharper if f.id == "index" else f for f in known["slab-offset*=1*"].fits]
+    known["slab-offset*=1*"] = known["slab-offset*=1*"].model_copy(update={"fits": fits})
+    (found,) = diagnose_run("it", known, [])
+    assert found.cause is not None
+    assert found.cause.value == pytest.approx(-0.01, abs=1e-6)
+    assert found.cases == list(sizes)
+    assert "explains 2 of 3 cases that are off, and with a size of their own 1 more" in (
+        found.sentence
+    )
+
+
+def test_what_scenes_document_is_told_in_their_words(tmp_path: Path) -> None:
+    """Only where everything that is off is documented."""
+    fault, cases, _ = LAWS["small angles: theta_t = theta_i / n"]
+    summary = run_tiny(tmp_path, student(fault), cases=cases)
+    (found,) = summary.diagnoses
+    assert as_documented(found, summary.cases) == found
+    told = [
+        case.model_copy(
+            update={
+                "checks": [
+                    c.model_copy(
+                        update={"status": Verdict.KNOWN, "cause": "it takes angles for small"}
+                    )
+                    for c in case.checks
+                ]
+            }
+        )
+        for case in summary.cases
+    ]
+    said = as_documented(found, told).sentence
+    assert said.startswith("student deviates in 3 cases as documented")
+    assert said.endswith(": small angles")
 
 
 # --- words ----------------------------------------------------------------------------------------

@@ -14,6 +14,8 @@ from scipy.stats import binom
 from harness.expected import Float, fresnel
 from harness.measure.comparison import Unmeasurable
 from harness.measure.images import Pixels
+from harness.measure.light_observables import sampled_path_weight
+from harness.measure.probe_truth import probe_truth
 from harness.measure.statistics import (
     BIN,
     FALSE_ALARM,
@@ -30,6 +32,11 @@ from harness.measure.statistics import (
     samples_needed,
     skewness,
 )
+from harness.probe.scenes import light_scene
+from harness.renderers.base import RenderSettings
+from harness.renderers.persistent import WorkerRenderer
+from tests.harness.tiny import prepared
+from tests.mutants.trial import SCENES as FAULT_SCENES
 
 RARE = 1e-4
 
@@ -100,6 +107,29 @@ def test_the_levels_of_checks_add_up_to_that_of_the_suite() -> None:
     assert pytest.approx(SUITE_LEVEL) == 1 - (1 - FALSE_ALARM) ** SUITE_CHECKS
     assert per_test(0.05, 1) == pytest.approx(0.05)
     assert 1 - (1 - per_test(0.05, 37)) ** 37 == pytest.approx(0.05)
+
+
+@pytest.mark.mitsuba
+def test_mitsuba_is_accused_no_more_often_than_stated(stock: WorkerRenderer) -> None:
+    """50 reruns with fresh seeds of what one face transmits and reflects, at 5% for both."""
+    (case,) = prepared("fresnel-outside[ior=1.5]", root=FAULT_SCENES)
+    many, level = samples_needed(), per_test(0.05, 2)
+    probes = []
+    for probe in case.loaded.model.probes:
+        planes = case.planes(probe)
+        scene = light_scene(case.scene, planes[0], probe.path)
+        probes.append((scene, probe_truth(case.scene, probe.path, planes)))
+    alarmed = 0
+    for seed in range(50):
+        settings = RenderSettings(samples=many, seed=3 * seed)
+        judged = [
+            sampled_path_weight(
+                truth, stock.render(scene, settings).pixels, Noise(many, level), n2=True
+            ).within
+            for scene, truth in probes
+        ]
+        alarmed += not all(judged)
+    assert alarmed <= at_most(50, 0.05)
 
 
 # --- power and equivalence ------------------------------------------------------------------------

@@ -218,7 +218,7 @@ class Turned(Rules):  # refracted rays are turned by a radians away from the nor
     def bend(self, d, n, ior_i, ior_t, entering, leg):
         bent, total = by_ratio(d, n, ior_i / ior_t)
         c, s, along = parts(bent, n)
-        theta = np.arctan2(s, -c) + self.a
+        theta = np.arctan2(s, c) + self.a
         return np.sin(theta)[:, None] * along - np.cos(theta)[:, None] * n, total
 
 
@@ -329,6 +329,13 @@ class FresnelOff(Rules):  # by a, of a light of 1
     def reflectance(self, cos_i, ior_i, ior_t, entering):
         right = super().reflectance(cos_i, ior_i, ior_t, entering)
         return np.where(right < 1, np.clip(right + self.a, 0, 1), 1.0)
+
+
+@fault
+class InnerExitClear(Rules):
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        right = super().reflectance(cos_i, ior_i, ior_t, entering)
+        return np.where(~entering & (ior_t != 1) & (right < 1), 0.0, right)
 
 
 @fault

@@ -29,6 +29,7 @@ class Question:
 
 
 QUESTIONS = (
+    Question("index", "index-off", "snell-near[ior=1.5]", "relative"),
     Question("index", "index-off", "snell-immersed[ior=1.5]", "relative"),
     Question("index", "index-off", "ball-view[ior=1.5]", "relative"),
     Question("index", "index-off", "prism-analytic[ior=1.5]", "relative"),
