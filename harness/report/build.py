@@ -19,6 +19,7 @@ from harness.errors import InputError
 from harness.record import CaseRecord, Summary, SummaryCase, Verdict
 from harness.report import changes, chart, mathml, overview, quantity, view
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
+from harness.report.detection import detection
 from harness.report.links import RunFolder, clean, page_name, url
 from harness.report.pagedata import case_data
 from harness.report.trends import Trends
@@ -194,6 +195,7 @@ class _Report:
             failures=overview.failures(self.summary),
             pages={row.id: row.page for row in rows},
             trends=self.trends.panels(self.summary),
+            detection=detection(),
             worst_page=_page_of(rows, verdict.worst_case),
         )
 
