@@ -7,13 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.diagnosis.edges import nearness
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, percent, plus_minus, says
+from harness.diagnosis.meshes import has_mesh, leaking_mesh, stretched_normals
 from harness.diagnosis.worlds import World
 from harness.expected import Float, lecture_table_angle, refract
 from harness.law import Interface, Mask, snell
 from harness.renderers.base import Rays
-from harness.scene.resolved import Mesh
 from harness.truth import TruePaths
 
 Bend = Callable[[Interface], tuple[Float, Mask]]
@@ -193,52 +192,11 @@ def _grazes(at: Interface) -> tuple[Float, Mask]:
 # --- normals and origins --------------------------------------------------------------------------
 
 
-def _stretched_normals(axis: int) -> Hypothesis:
-    def world(world: World, a: Values) -> World:
-        stretch = np.ones(3)
-        stretch[axis] = a[0]
-
-        def normal(n: Float, on_mesh: Mask) -> Float:
-            wrong = np.where(on_mesh[:, None], n * stretch, n)
-            return np.asarray(wrong / np.linalg.norm(wrong, axis=1, keepdims=True))
-
-        return world.with_law(normal=normal)
-
-    def text(fit: Fitted) -> str:
-        scale = np.sqrt(max(fit.values[0], 0))
-        return (
-            "transforms a mesh's normals as if they were points, by a matrix that stretches "
-            f"{'xyz'[axis]} {scale:.4g} times, instead of by its inverse transpose"
-        )
-
-    return Hypothesis(
-        f"normals-stretched-{'xyz'[axis]}",
-        world,
-        text,
-        ((2.0,), (0.5,), (1.05,)),
-        "stretch²",
-        applies=_has_mesh,
-    )
-
-
 def _inside_out(at: Interface) -> tuple[Float, Mask]:
     bent, total = snell(at)
     wrong, wrongly = _inverted(at)
     on = at.on_mesh
     return np.where(on[:, None], wrong, bent), np.where(on, wrongly, total)
-
-
-def _leaking_mesh(world: World, a: Values) -> World:
-    """What becomes of rays within a[0] (barycentric) of a triangle's edge is open."""
-
-    def lost(paths: TruePaths) -> Mask:
-        return np.asarray((nearness(world.scene, paths.interface) < a[0]).any(axis=1))
-
-    return replace(world, lost=lost)
-
-
-def _has_mesh(world: World) -> bool:
-    return any(isinstance(solid.shape, Mesh) for solid in world.scene.solids)
 
 
 def _spawned(world: World, a: Values, fixed: float, growing: float) -> World:
@@ -328,12 +286,12 @@ REFRACTION = (
         "entry-straight", lambda at: _straight_where(at, at.entering),
         "refracts on the way out only",
     ),
-    _lawless("mesh-inside-out", _inside_out, "takes triangle meshes inside out", _has_mesh),
+    _lawless("mesh-inside-out", _inside_out, "takes triangle meshes inside out", has_mesh),
     Hypothesis(
-        "mesh-leaks", _leaking_mesh,
+        "mesh-leaks", leaking_mesh,
         says("loses rays at the edges of triangles: its meshes are not watertight"),
         tuple((m * 10.0**k,) for k in range(-8, -1) for m in (1, 3)), "barycentric distance",
-        continuous=False, applies=_has_mesh,
+        continuous=False, applies=has_mesh,
     ),
     _lawless("tir-leaks", _leaks, "lets light out where all of it should be reflected"),
     _lawless(
@@ -362,7 +320,7 @@ REFRACTION = (
         lambda f: f"refracts directions {1 + f.values[0]:.6g} long instead of unit vectors",
         ((0.01,), (-0.01,), (0.2,), (-0.2,)), "excess length",
     ),
-    *(_stretched_normals(axis) for axis in range(3)),
+    *(stretched_normals(axis) for axis in range(3)),
     Hypothesis(
         "spawn-normal", lambda w, a: _spawned(w, a, 1, 0),
         lambda f: f"starts rays {f} units off the surface along its normal, not where they hit",

@@ -1,0 +1,59 @@
+"""What renderers do to triangles: wrong normals, and gaps between them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from harness.diagnosis.edges import nearness
+from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
+from harness.diagnosis.worlds import World
+from harness.expected import Float
+from harness.law import Mask
+from harness.scene.resolved import Mesh
+from harness.truth import TruePaths
+
+
+def stretched_normals(axis: int) -> Hypothesis:
+    """Normals by a matrix that stretches `axis`, not by its inverse transpose."""
+
+    def world(world: World, a: Values) -> World:
+        stretch = np.ones(3)
+        stretch[axis] = a[0]
+
+        def normal(n: Float, on_mesh: Mask) -> Float:
+            wrong = np.where(on_mesh[:, None], n * stretch, n)
+            return np.asarray(wrong / np.linalg.norm(wrong, axis=1, keepdims=True))
+
+        return world.with_law(normal=normal)
+
+    def text(fit: Fitted) -> str:
+        scale = np.sqrt(max(fit.values[0], 0))
+        return (
+            "transforms a mesh's normals as if they were points, by a matrix that stretches "
+            f"{'xyz'[axis]} {scale:.4g} times, instead of by its inverse transpose"
+        )
+
+    return Hypothesis(
+        f"normals-stretched-{'xyz'[axis]}",
+        world,
+        text,
+        ((2.0,), (0.5,), (1.05,)),
+        "stretch²",
+        applies=has_mesh,
+    )
+
+
+def leaking_mesh(world: World, a: Values) -> World:
+    """What becomes of rays within a[0] (barycentric) of a triangle's edge is open."""
+
+    def lost(paths: TruePaths) -> Mask:
+        return np.asarray((nearness(world.scene, paths.interface) < a[0]).any(axis=1))
+
+    return replace(world, lost=lost)
+
+
+def has_mesh(world: World) -> bool:
+    """Whether any solid is made of triangles."""
+    return any(isinstance(solid.shape, Mesh) for solid in world.scene.solids)
