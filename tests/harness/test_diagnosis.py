@@ -256,9 +256,7 @@ def test_what_scenes_document_is_told_in_their_words(tmp_path: Path) -> None:
         case.model_copy(
             update={
                 "checks": [
-                    c.model_copy(
-                        update={"status": Verdict.KNOWN, "cause": "it takes angles for small"}
-                    )
+                    c.model_copy(update={"status": Verdict.KNOWN, "cause": "small angles"})
                     for c in case.checks
                 ]
             }
