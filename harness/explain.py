@@ -11,6 +11,7 @@ from harness.camera import primary_rays
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
 from harness.diagnosis.whole_run import Witness, diagnose_run
+from harness.documented import is_documented, known_here, known_in_run
 from harness.errors import ImageNotFinite
 from harness.measure.comparison import Unmeasurable
 from harness.measure.images import Pixels
@@ -47,6 +48,8 @@ class Explainer:
         mine = [c for c in checks if c.renderer == contender.name and c.against == "truth"]
         if contender.absent is not None or not any(c.status in OFF for c in mine):
             return None
+        if (documented := known_here(contender.name, mine)) is not None:
+            return documented
         evidence = list(self._evidence(contender))
         return diagnose(contender.name, evidence) if evidence else None
 
@@ -102,6 +105,7 @@ def explain_run(
 ) -> list[Diagnosis]:
     """Why each renderer is off in this run; nothing of those that are not.
 
+    What no scene documents comes first, then what scenes do.
     `renderers` are named with the reason why they are out, which is "" where they are not.
     """
     found: list[Diagnosis] = []
@@ -109,10 +113,16 @@ def explain_run(
         _, failed, findings = reason.partition(FAILED_PREFLIGHT)
         if failed:
             found.append(explain_preflight(renderer, findings))
-        by_case = {c.id: d for c in judged for d in c.diagnoses if d.renderer == renderer}
+        by_case = {
+            c.id: d
+            for c in judged
+            for d in c.diagnoses
+            if d.renderer == renderer and not is_documented(d)
+        }
         if by_case:
             witnesses = list(_witnesses(cases, judged, renderer))
             found += diagnose_run(renderer, by_case, witnesses)
+        found += known_in_run(renderer, judged)
     return found
 
 
