@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
+import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -58,6 +59,9 @@ def connected(text: str) -> Iterator[Cluster]:
         import distributed
     except ModuleNotFoundError:
         raise InputError.of("a cluster needs Dask", key="--cluster", expected=INSTALL) from None
+    # What is lost is told once, by us; Dask's own threads would add a traceback for each of theirs.
+    for name in ("distributed", "tornado", "asyncio"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with contextlib.ExitStack() as stack:
         address: Any = text
         if local is not None:

@@ -10,6 +10,7 @@ from harness import plan
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
 from harness.diagnosis.whole_run import Witness, diagnose_run
+from harness.documented import is_documented, known_here, known_in_run
 from harness.errors import ImageNotFinite
 from harness.measure.comparison import Unmeasurable
 from harness.measure.images import Pixels
@@ -46,6 +47,8 @@ class Explainer:
         mine = [c for c in checks if c.renderer == contender.name and c.against == "truth"]
         if contender.absent is not None or not any(c.status in OFF for c in mine):
             return None
+        if (documented := known_here(contender.name, mine)) is not None:
+            return documented
         evidence = list(self._evidence(contender))
         return diagnose(contender.name, evidence) if evidence else None
 
@@ -105,6 +108,7 @@ def explain_run(
 ) -> list[Diagnosis]:
     """Why each renderer is off in this run; nothing of those that are not.
 
+    What no scene documents comes first, then what scenes do.
     `renderers` are named with the reason why they are out, which is "" where they are not.
     """
     found: list[Diagnosis] = []
@@ -112,34 +116,17 @@ def explain_run(
         _, failed, findings = reason.partition(FAILED_PREFLIGHT)
         if failed:
             found.append(explain_preflight(renderer, findings))
-        by_case = {c.id: d for c in judged for d in c.diagnoses if d.renderer == renderer}
+        by_case = {
+            c.id: d
+            for c in judged
+            for d in c.diagnoses
+            if d.renderer == renderer and not is_documented(d)
+        }
         if by_case:
             witnesses = list(_witnesses(cases, judged, renderer))
-            found += [
-                as_documented(diagnosis, judged)
-                for diagnosis in diagnose_run(renderer, by_case, witnesses)
-            ]
+            found += diagnose_run(renderer, by_case, witnesses)
+        found += known_in_run(renderer, judged)
     return found
-
-
-def as_documented(diagnosis: Diagnosis, judged: Sequence[SummaryCase]) -> Diagnosis:
-    """A diagnosis that found no cause says the scenes' own where they document all that is off."""
-    off = [
-        check
-        for case in judged
-        if case.id in diagnosis.unexplained
-        for check in case.checks
-        if check.renderer == diagnosis.renderer and check.against == "truth" and check.status in OFF
-    ]
-    if diagnosis.cause is not None or not off or any(c.status is not Verdict.KNOWN for c in off):
-        return diagnosis
-    causes = "; ".join(dict.fromkeys(check.cause for check in off))
-    n = len(diagnosis.unexplained)
-    sentence = (
-        f"{diagnosis.renderer} deviates in {n} case{'s' * (n > 1)} as documented, which none of "
-        f"the known causes alone explains: {causes}"
-    )
-    return diagnosis.model_copy(update={"sentence": sentence})
 
 
 def explain_preflight(name: str, findings: str) -> Diagnosis:

@@ -101,7 +101,8 @@ class CauseFit(Model):
 class Diagnosis(Model):
     """Why a renderer is off, in one case or, with `cases`, in all of a run.
 
-    `cause` is None where none of the known causes fits, and `sentence` says so. `deviation` is the
+    `cause` is None where none of the known causes fits, and `sentence` says so; its id is
+    "documented" where it is the one that scenes state of a KNOWN deviation. `deviation` is the
     size of what is to be explained, in units of the tolerances, `rays` how many rays tell of it.
     `cases` are those that the cause explains, `unexplained` those that it does not.
     """

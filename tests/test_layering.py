@@ -37,7 +37,7 @@ LAYERS = (
     ("measure",),
     ("diagnosis",),
     ("chart",),
-    ("verdict", "preflight", "attribution"),
+    ("verdict", "preflight", "attribution", "documented"),
     ("report",),
     ("plan", "results", "probed", "pairs", "explain", "spectral", "judge"),
     ("baseline", "packing", "archive"),

@@ -129,12 +129,9 @@ class _Report:
     def case(self, record: CaseRecord, path: Path) -> str:
         folder = RunFolder(self.folder, up="../")
         runs = [
-            (
-                run,
-                view.renderer_verdict(run.name, record.checks, run),
-                [view.picture(image, folder) for image in run.images],
-            )
+            (run, verdict, [view.picture(image, folder) for image in run.images])
             for run in record.runs
+            if (verdict := view.renderer_verdict(run.name, record.checks, run)) or run.images
         ]
         charts = [chart.draw(curve, self.colours) for curve in record.curves]
         name, parameters = view.split_id(record.id)

@@ -358,9 +358,12 @@ def _cell(
 def renderer_verdict(
     renderer: str, checks: Iterable[Check], run: RendererRun | None
 ) -> Verdict | None:
-    """Of a renderer in one case: its run's and its checks' worst; None where it had no part."""
+    """Of a renderer in one case: its run's and its checks' worst.
+
+    None where it had no part; a run that nothing was checked in has not passed.
+    """
     verdicts = [check.status for check in checks if check.renderer == renderer]
-    if run:
+    if run and (verdicts or run.status is not Verdict.PASS):
         verdicts.append(run.status)
     return worst(verdicts) if verdicts else None
 

@@ -40,10 +40,11 @@ def _ratios(axes: Any, figures: Mapping[str, Any], goals: Mapping[str, float]) -
     for place, name in zip(places, names, strict=True):
         axes.plot([goals[name]] * 2, [place - 0.4, place + 0.4], color=GOAL, linewidth=3)
         ratio = figures[name]["ratio"]
-        axes.annotate(f" {ratio:.3g}", (ratio, place), va="center")
+        axes.annotate(f"  {ratio:.4g}", (max(ratio, goals[name]), place), va="center")
     axes.set_yticks(places, [name.replace("_", " ").replace(".", "\n") for name in names])
     axes.invert_yaxis()
     axes.set_xscale("log")
+    axes.margins(x=0.2)
     axes.set_title("Ratios; grey: the goals")
 
 

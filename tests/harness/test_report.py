@@ -528,3 +528,13 @@ def test_files_with_odd_names_can_be_linked(tmp_path: Path) -> None:
     link = RunFolder(tmp_path).href(name)
     assert link is not None
     assert unquote(urlsplit(link).path) == name
+
+
+def test_a_renderer_that_nothing_was_checked_of_has_not_passed(tmp_path: Path) -> None:
+    case = passing()
+    bystander = run_of("povray-stock", Verdict.PASS).model_copy(update={"images": []})
+    case = case.model_copy(update={"runs": [*case.runs, bystander]})
+    write_report(small_run(tmp_path, case))
+    (page,) = (p for p in pages(tmp_path) if p.path.parent.name == "cases")
+    scores = [a for _, a in page.elements if "data-renderer" in a]
+    assert [a["data-renderer"] for a in scores] == ["tracer"]

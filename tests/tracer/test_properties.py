@@ -184,18 +184,17 @@ def mapped(
 
 
 @compiled
-@given(seeds, iors)
-def test_turning_the_world_turns_the_rays(seed: int, ior: float) -> None:
+@given(seeds, shapes, iors)
+def test_turning_the_world_turns_the_rays(seed: int, shape: str, ior: float) -> None:
     rng = np.random.default_rng(seed)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
-    mesh = cube_mesh()
+    solid = SHAPES[shape]
     origins, directions = rays_at(rng, 100)
-    a = follow(glass(mesh, ior), origins, directions, "TT", vertices=True)
-    moved = replace(mesh, vertices=mesh.vertices @ turn.T)
+    a = follow(glass(solid, ior), origins, directions, "TT", vertices=True)
     directions = directions @ turn.T
     directions /= np.linalg.norm(directions, axis=1)[:, None]
-    b = follow(glass(moved, ior), origins @ turn.T, directions, "TT", vertices=True)
+    b = follow(glass(turned(solid, turn), ior), origins @ turn.T, directions, "TT", vertices=True)
     # Rays within 1e-9 of an edge or of critical may fall on the other side of it.
     same = a.status == b.status
     assert same.mean() > 0.97
@@ -203,12 +202,28 @@ def test_turning_the_world_turns_the_rays(seed: int, ior: float) -> None:
     assert (close | ~same).mean() > 0.97
 
 
+def turned(shape: object, turn: Floats) -> object:
+    def around(v: Vec) -> Vec:
+        x, y, z = (turn @ np.array(v)).tolist()
+        return x, y, z
+
+    def bound(b: Plane | Quadric) -> Plane | Quadric:
+        if isinstance(b, Plane):
+            return Plane(normalise(around(b.normal)), b.offset)
+        return replace(b, origin=around(b.origin), axis=normalise(around(b.axis)))
+
+    if isinstance(shape, Mesh):
+        return replace(shape, vertices=shape.vertices @ turn.T)
+    assert isinstance(shape, Sphere | Cell | Compound)
+    return mapped(shape, bound, around(shape.center), shape.radius)
+
+
 @compiled
-@given(seeds, iors)
-def test_energy_is_kept_at_every_interface(seed: int, ior: float) -> None:
+@given(seeds, shapes, iors)
+def test_energy_is_kept_at_every_interface(seed: int, shape: str, ior: float) -> None:
     """R + T = 1 along both ways that a ray can take, so the weights of all paths sum to 1."""
     origins, directions = rays_at(np.random.default_rng(seed), 100)
-    scene = glass(cube(), ior)
+    scene = glass(SHAPES[shape], ior)
     met = ~np.isnan(follow(scene, origins, directions, "R", vertices=True).vertices[:, 1, 0])
     reflected = follow(scene, origins, directions, "R").weight[met]
     passed = follow(scene, origins, directions, "T").weight[met]
