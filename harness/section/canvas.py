@@ -23,7 +23,7 @@ Box = tuple[float, float, float, float]  # left, top, right, bottom
 WIDTH = 720.0  # of the drawing, in its own units
 NORMAL, ARC = 44.0, 26.0  # lengths of normals and radii of angles
 LETTER, LINE = 6.6, 15.0  # width and height that a letter of a label takes
-FEW = 24  # corners of an outline, at most, whose edges labels avoid
+FEW = 48  # corners of an outline, at most, that labels keep away from
 FAINTEST = 0.25  # opacity of a ray that carries nothing
 RAY = "#d9480f"  # the colour of rays that have none of their own
 TINTS = (1.0, 2.5)  # indices between which a medium's tint deepens
@@ -42,6 +42,7 @@ class Canvas:
         self.height = self.scale * window.height
         self.elements: list[str] = []
         self.texts: list[tuple[str, list[Points]]] = []  # and where they may stand, best first
+        self.names: list[tuple[str, list[Points]]] = []  # of media, which have most room
         self.lines: list[tuple[Points, Points]] = []  # what no text should cover
 
     def _flat(self, points: Points) -> Points:
@@ -56,8 +57,8 @@ class Canvas:
         if not loops:
             return
         for loop in loops:
-            if len(loop) <= FEW:  # straight edges, which a text along them would hide
-                self.lines += list(zip(loop, np.roll(loop, -1, axis=0), strict=True))
+            edge = loop[:: -(-len(loop) // FEW)]  # near enough to keep a text off it
+            self.lines += list(zip(edge, np.roll(edge, -1, axis=0), strict=True))
         medium = scene.media[solid.medium]
         d = " ".join("M" + " L".join(map(_pair, loop)) + "Z" for loop in loops)
         low, high = TINTS
@@ -69,7 +70,7 @@ class Canvas:
         )
         text = f"{medium.name} n = {medium.ior:.6g}"
         if spots := self._spots_within(loops, LETTER * len(text) / 2):
-            self.texts.append((text, spots))
+            self.names.append((text, spots))
 
     def _spots_within(self, loops: list[Points], half: float) -> list[Points]:
         """Where a text of half that width lies wholly in a solid, from the bottom upwards."""
@@ -161,7 +162,8 @@ class Canvas:
     def _labels(self) -> list[str]:
         """Each text where it covers least of other texts and of lines."""
         taken: list[Box] = []
-        for text, spots in self.texts:
+        texts = self.texts + self.names
+        for text, spots in texts:
             half, high = LETTER * len(text) / 2, LINE / 2
             room = np.array([WIDTH - half - 3, self.height - high - 2])
             inside = [np.clip(spot, [half + 3, high + 2], room) for spot in spots]
@@ -169,7 +171,7 @@ class Canvas:
             taken.append(min(boxes, key=lambda box: self._covered(box, taken)))
         return [
             f'<text x="{(left + right) / 2:.2f}" y="{bottom - 3.5:.2f}">{escape(text)}</text>'
-            for (text, _), (left, _, right, bottom) in zip(self.texts, taken, strict=True)
+            for (text, _), (left, _, right, bottom) in zip(texts, taken, strict=True)
         ]
 
     def _covered(self, box: Box, taken: Sequence[Box]) -> float:
