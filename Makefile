@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references findings test fuzz lint stress format lock ui bench clean
+.PHONY: help setup suite catalogue references findings test fuzz lint stress format lock ui bench scale clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -55,6 +55,10 @@ ui: ## Rebuild the report's script from harness/report/ui (needs Node)
 
 bench: setup ## Measure the tracer's speed and write reports/bench.json and bench.svg
 	@$(BIN)/python -m tests.bench $(ARGS)
+
+scale: setup ## Measure what a cluster costs and gains, and write docs/scale.md
+	@$(BIN)/snellcheck run smoke --quality draft --out reports/scale || test $$? -eq 1
+	@$(BIN)/python -m tests.bench.scale reports/scale
 
 clean: ## Remove the environment, caches and reports
 	rm -rf .venv build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

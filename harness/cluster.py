@@ -70,7 +70,7 @@ def connected(text: str) -> Iterator[Cluster]:
             address = stack.enter_context(
                 distributed.LocalCluster(
                     n_workers=int(local[1]), threads_per_worker=1, processes=True,
-                    dashboard_address=None,
+                    dashboard_address=":0",  # any free port: 8787 may be taken
                 )
             )  # fmt: skip
         try:

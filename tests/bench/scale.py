@@ -1,0 +1,128 @@
+"""What a cluster costs and gains: ``make scale`` measures it here and writes docs/scale.md.
+
+One worker process against two, over Dask, on this machine. Rounds take turns, so that whatever
+else the machine does slows both.
+"""
+
+from __future__ import annotations
+
+import concurrent.futures
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from harness import record
+from harness.cluster import connected
+from harness.documents import write_text
+from harness.parcel import pack_job, pack_result
+from harness.plan import Job
+from harness.remote import Origin, RemoteRenderer
+from harness.renderers.base import RenderSettings
+from harness.renderers.tracer import TracerEngine
+from harness.scene.resolved import ResolvedScene
+from tests.bench.measuring import ROOT, median, scene_of, seconds
+
+ROUNDS = 5
+BUSY_JOBS, BUSY_SIZE = 24, 768
+SMALL_JOBS, SMALL_SIZE = 300, 4
+SETTINGS = RenderSettings(threads=1)
+MILLION = 1_000_000
+PAGE = ROOT / "docs" / "scale.md"
+
+TEXT = """\
+# A million cases
+
+Made by `make scale`; do not edit. Measured with snellcheck {version} on {cores} cores, Python
+{python}, {system}, over Dask on this one machine.
+
+## Measured
+
+| | |
+|--|--|
+| one job of a glass ball, {size} x {size} pixels, computed directly | {direct:.3f} s |
+| {jobs} such jobs on 1 worker | {one:.2f} s |
+| {jobs} such jobs on 2 workers | {two:.2f} s |
+| **efficiency from 1 to 2 workers** | **{efficiency:.0%}** |
+| a job that computes nothing, there and back, client and scheduler included | {overhead:.1f} ms |
+| a scene on its way there | {there:.1f} kB |
+| its image on the way back, {size} x {size} x 3 floats | {back:.0f} kB |
+| the record of a case, with its verdicts and derivations | {record:.0f} kB |
+
+The two workers share {cores} cores with the scheduler and the client, which packs scenes, judges
+and writes: on machines of their own they have these cores for themselves.
+
+## What follows for 10⁶ cases
+
+A case of the suite is about {per_case:.0f} jobs, most of them small. A job's parcel costs
+{overhead:.1f} ms of the client, so one client would be {client_h:.0f} hours at the parcels of 10⁶
+cases. It feeds about {fed:.0f} workers whose jobs take {direct:.2f} s each before it is what
+everybody waits for.
+
+Beyond that, cut the suite: `--shard i/n` gives each of n clients its own cases, balanced by
+recorded times, and `snellcheck merge` puts the parts together and refuses what is missing, double
+or of another version. With 100 shards a client has 10⁴ cases and {shard_h:.1f} hours of parcels,
+while its workers render.
+
+Records of 10⁶ cases are {records_gb:.0f} GB without pictures; a shard's are {shard_mb:.0f} MB. A
+report's index grows by about a kilobyte for each case, so a report is best made for a shard, and
+`summary.json` for everything. Results go to disk as they come, and a run that ended early goes on
+where it was.
+"""
+
+
+def all_done(renderer: RemoteRenderer, scene: ResolvedScene, jobs: int) -> None:
+    with concurrent.futures.ThreadPoolExecutor(renderer.concurrency) as pool:
+        waiting = [pool.submit(renderer.render, scene, SETTINGS) for _ in range(jobs)]
+        for one in waiting:
+            one.result()
+
+
+def in_turns(works: list[Callable[[], object]]) -> list[float]:
+    """Median seconds of each, over rounds in which each has its turn."""
+    for work in works:
+        work()  # workers start, and load what was compiled
+    rounds = [[seconds(work) for work in works] for _ in range(ROUNDS)]
+    return [median(list(times)) for times in zip(*rounds, strict=True)]
+
+
+def main(run: Path) -> None:
+    """`run` is the folder of a run, for the sizes of records and the number of jobs of a case."""
+    busy = scene_of("ball/checkerboard.toml", BUSY_SIZE)
+    small = scene_of("ball/checkerboard.toml", SMALL_SIZE)
+    engine = TracerEngine()
+    tracer = Origin("registered", "tracer")
+    with connected("local:1") as first, connected("local:2") as second:
+        alone, both = first.renderer("tracer", tracer), second.renderer("tracer", tracer)
+        one, two, direct, carried, computed = in_turns([
+            lambda: all_done(alone, busy, BUSY_JOBS),
+            lambda: all_done(both, busy, BUSY_JOBS),
+            lambda: engine.render(busy, SETTINGS),
+            lambda: all_done(alone, small, SMALL_JOBS),
+            lambda: [engine.render(small, SETTINGS) for _ in range(SMALL_JOBS)],
+        ])  # fmt: skip
+    parcel = pack_job(Job("tracer", "", busy, SETTINGS))
+    files = sorted((run / "records").glob("*.json"))
+    summary = record.read_summary(run / "summary.json")
+    overhead_s = (carried - computed) / SMALL_JOBS
+    record_kb = sum(file.stat().st_size for file in files) / len(files) / 1e3
+    per_case = (summary.effort.rendered + summary.effort.reused) / len(files)
+    text = TEXT.format(
+        version=summary.snellcheck_version, cores=os.cpu_count(),
+        python=platform.python_version(), system=platform.system(),
+        jobs=BUSY_JOBS, size=BUSY_SIZE, direct=direct, one=one, two=two,
+        efficiency=one / two / 2, overhead=overhead_s * 1e3,
+        there=(len(json.dumps(parcel.meta)) + sum(map(len, parcel.blocks.values()))) / 1e3,
+        back=sum(map(len, pack_result(engine.render(busy, SETTINGS)).blocks.values())) / 1e3,
+        record=record_kb, per_case=per_case,
+        client_h=MILLION * per_case * overhead_s / 3600, fed=direct / overhead_s,
+        shard_h=MILLION * per_case * overhead_s / 3600 / 100,
+        records_gb=MILLION * record_kb / 1e6, shard_mb=MILLION / 100 * record_kb / 1e3,
+    )  # fmt: skip
+    write_text(PAGE, text)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
