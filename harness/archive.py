@@ -15,7 +15,8 @@ import numpy as np
 from harness import __version__, plan, record
 from harness.documents import PARTIAL
 from harness.errors import RendererError, RendererFailed
-from harness.judge import Judgement
+from harness.judging.judge import Judgement
+from harness.judging.results import Contender, Results
 from harness.measure.images import Pixels
 from harness.packing import write_pack
 from harness.plan import PreparedCase
@@ -23,7 +24,6 @@ from harness.probe.scenes import AXES
 from harness.probe.view import view_of_codes, view_of_rays
 from harness.record import CaseRecord, DifferenceMap, ImageFile, RendererRun, Table, Verdict, worst
 from harness.renderers.base import Image, RayPaths, RenderSettings
-from harness.results import Contender, Results
 from harness.scene.fingerprint import fingerprint
 
 LOG_LINES = 40

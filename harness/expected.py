@@ -1,7 +1,7 @@
 """Closed forms: what physics says that a renderer must show.
 
-Nothing here imports a renderer or the tracer. The formulas are the textbook ones; `harness.truth`
-chains them along a stated path through a scene.
+Nothing here imports a renderer or the tracer. The formulas are the textbook ones;
+`harness.truth.paths` chains them along a stated path through a scene.
 
 Angles are radians unless a name says otherwise; directions are unit vectors along travel.
 """

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.chart import (
+from harness.expected import Float
+from harness.probe.chart import (
     affine,
     chart,
     examine,
@@ -24,7 +25,6 @@ from harness.chart import (
     true_coordinates,
     true_ramp,
 )
-from harness.expected import Float
 from harness.probe.decode import decode, finest_cells
 from harness.probe.scenes import AMPLITUDE, AXES, code_scene
 from harness.renderers.base import Capability, Image, Renderer, RenderSettings

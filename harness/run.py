@@ -8,19 +8,20 @@ import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 
-from harness import __version__, lanes, record
+from harness import __version__, record
 from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
 from harness.cache.stores import FolderStore
 from harness.errors import InputError
-from harness.explain import explain_run
+from harness.judging.explain import explain_run
+from harness.judging.results import Contender
 from harness.plan import PreparedCase
 from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdict
 from harness.renderers.base import Renderer, RenderSettings
-from harness.results import Contender
-from harness.session import Progress, Session, Storage
-from harness.shard import write_times
+from harness.running import lanes
+from harness.running.session import Progress, Session, Storage
+from harness.running.shard import write_times
 
 __all__ = ["EXIT_INTERRUPTED", "HELPER", "SAMPLES", "UNFINISHED", "Progress", "exit_code", "run"]
 

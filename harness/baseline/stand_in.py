@@ -13,11 +13,11 @@ from harness import plan
 from harness.baseline.document import Baseline, Kept
 from harness.baseline.source import Baselines
 from harness.errors import InputError
+from harness.judging.results import Contender
 from harness.plan import PreparedCase
 from harness.preflight import Preflight
 from harness.record import Verdict
 from harness.renderers.base import Capability, Image, RenderSettings
-from harness.results import Contender
 from harness.scene.fingerprint import fingerprint
 
 Stood = tuple[Contender, Mapping[str, Image]]  # images by role

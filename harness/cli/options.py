@@ -51,8 +51,8 @@ history_option = click.option(
 
 def add_to_history(summary: Summary, out: Path) -> None:
     """Adds a run to the user's history, or says why it could not."""
-    from harness.history import History, history_file
-    from harness.revision import revision
+    from harness.history.revision import revision
+    from harness.history.store import History, history_file
 
     trouble = History(history_file()).add(summary, revision(Path.cwd()), out)
     if trouble:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from harness.cluster import Cluster
     from harness.renderers.base import Renderer
+    from harness.running.cluster import Cluster
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ class Place:
 
         `commands` and `configs` are what the user's own among them were made from.
         """
-        from harness import remote
         from harness.renderers import registry
         from harness.run import HELPER
+        from harness.running import remote
 
         if self.cluster is None:
             helper = next((one for one in chosen if one.name == HELPER), None)
@@ -55,7 +55,7 @@ def places(cluster: str | None) -> Iterator[Place]:
     if cluster is None:
         yield Place()
         return
-    from harness.cluster import connected
+    from harness.running.cluster import connected
 
     with connected(cluster) as found:
         yield Place(found)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from harness.plan import PreparedCase
-    from harness.shard import ShardNote
+    from harness.running.shard import ShardNote
 
 
 def divided(
@@ -25,7 +25,7 @@ def divided(
     """
     from harness.data import scenes_root
     from harness.errors import InputError
-    from harness.shard import TIMES, Shard, ShardNote, divide, read_times, suite_hash
+    from harness.running.shard import TIMES, Shard, ShardNote, divide, read_times, suite_hash
 
     shard = Shard.parse(text)
     if shard.count > len(cases):

@@ -10,9 +10,9 @@ import numpy as np
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, plus_minus, says
 from harness.diagnosis.worlds import World
 from harness.expected import Float, fresnel
-from harness.law import Interface, Leg, Mask
 from harness.renderers.base import Rays, Status
-from harness.truth import TruePaths
+from harness.truth.law import Interface, Leg, Mask
+from harness.truth.paths import TruePaths
 
 Reflectance = Callable[[Interface], Float]
 

@@ -10,9 +10,9 @@ from harness.diagnosis.edges import nearness
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
 from harness.diagnosis.worlds import World
 from harness.expected import Float
-from harness.law import Mask
 from harness.scene.resolved import Mesh
-from harness.truth import TruePaths
+from harness.truth.law import Mask
+from harness.truth.paths import TruePaths
 
 
 def stretched_normals(axis: int) -> Hypothesis:

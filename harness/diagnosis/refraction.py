@@ -11,9 +11,9 @@ from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, percent, pl
 from harness.diagnosis.meshes import has_mesh, leaking_mesh, stretched_normals
 from harness.diagnosis.worlds import World
 from harness.expected import Float, lecture_table_angle, refract
-from harness.law import Interface, Mask, snell
 from harness.renderers.base import Rays
-from harness.truth import TruePaths
+from harness.truth.law import Interface, Mask, snell
+from harness.truth.paths import TruePaths
 
 Bend = Callable[[Interface], tuple[Float, Mask]]
 

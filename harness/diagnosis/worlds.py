@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting
 from harness.expected import Float
-from harness.law import PHYSICS, Law
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import ResolvedScene
-from harness.truth import ClosedForm, TruePaths
+from harness.truth.law import PHYSICS, Law
+from harness.truth.paths import ClosedForm, TruePaths
 
 
 @dataclass(frozen=True)

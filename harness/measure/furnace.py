@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.camera import primary_rays
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.images import Pixels
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS
 from harness.measure.statistics import Noise, binned
 from harness.scene.resolved import ResolvedScene
-from harness.tree import light_around
-from harness.truth import ClosedForm
+from harness.truth.camera import primary_rays
+from harness.truth.paths import ClosedForm
+from harness.truth.tree import light_around
 
 # Renderers in float32 start a ray as far from the surface that it leaves; shorter ways they lose.
 STEP_OFF = 2e-4

@@ -50,7 +50,7 @@ def distance_to_nature(
 ) -> dict[str, float | int | str]:
     """How far the model that is judged is from nature, at worst, and what nature shows there.
 
-    Nature's light is polarised by each interface that it meets (`harness.tree`).
+    Nature's light is polarised by each interface that it meets (`harness.truth.tree`).
     """
     gap = np.abs(natural - true).max(axis=1)
     k = int(np.argmax(np.where(used, gap, -1)))

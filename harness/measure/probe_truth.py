@@ -14,14 +14,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.camera import primary_rays
 from harness.expected import Float
 from harness.measure.precision import Precision
 from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
 from harness.scene.resolved import Rectangle, ResolvedScene
-from harness.tree import branches, natural_weight
-from harness.truth import ClosedForm, Landing, TruePaths
+from harness.truth.camera import primary_rays
+from harness.truth.paths import ClosedForm, Landing, TruePaths
+from harness.truth.tree import branches, natural_weight
 
 # Step of the differences, relative to the scene's extent. Larger than any float32 renderer's own
 # error, so that a ray within that error of an edge is recognised as grazing it.

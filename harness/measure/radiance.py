@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.camera import primary_rays
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.images import Pixels
@@ -31,6 +30,7 @@ from harness.scene.resolved import (
     Surface,
     Translucent,
 )
+from harness.truth.camera import primary_rays
 
 
 def true_picture(scene: ResolvedScene) -> tuple[Float, Float]:

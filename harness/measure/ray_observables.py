@@ -29,7 +29,7 @@ from harness.measure.ray_parts import (
 from harness.measure.rays import RayMeasurement
 from harness.renderers.base import Status
 from harness.scene.resolved import Mesh, Solid, Sphere
-from harness.truth import ClosedForm
+from harness.truth.paths import ClosedForm
 
 
 def exit_point(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:

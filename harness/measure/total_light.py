@@ -17,8 +17,8 @@ from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.ray_parts import indices
 from harness.measure.statistics import Noise, binned
 from harness.renderers.base import Status
-from harness.tree import light_on
-from harness.truth import ClosedForm
+from harness.truth.paths import ClosedForm
+from harness.truth.tree import light_on
 
 # Half the width of the window of angles around Brewster's, rad.
 WINDOW = np.radians(1.0)

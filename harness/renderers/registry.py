@@ -23,7 +23,7 @@ Factory = Callable[[], Renderer]
 ONLY_WHERE_NAMED = frozenset({"povray-stock"})
 
 # What stands between the harness and an engine in a worker, beside the engine's own adapter.
-HOSTING = ("harness.camera", "harness.renderers.persistent", "harness.renderers.worker")
+HOSTING = ("harness.truth.camera", "harness.renderers.persistent", "harness.renderers.worker")
 
 INSTALL_MITSUBA = "pip install 'snellcheck[mitsuba]'"
 

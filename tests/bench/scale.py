@@ -15,13 +15,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from harness import record
-from harness.cluster import connected
 from harness.documents import write_text
-from harness.parcel import pack_job, pack_result
 from harness.plan import Job
-from harness.remote import Origin, RemoteRenderer
 from harness.renderers.base import RenderSettings
 from harness.renderers.tracer import TracerEngine
+from harness.running.cluster import connected
+from harness.running.parcel import pack_job, pack_result
+from harness.running.remote import Origin, RemoteRenderer
 from harness.scene.resolved import ResolvedScene
 from tests.bench.measuring import ROOT, median, scene_of, seconds
 

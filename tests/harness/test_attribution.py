@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harness.attribution import ALIKE, WRONG, attributed, most_likely_right
+from harness.judging.attribution import ALIKE, WRONG, attributed, most_likely_right
 from harness.record import Attribution, Check, Verdict
 
 

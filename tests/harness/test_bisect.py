@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from harness.bisect import Answer, Step, bisect, run_of
-from harness.bisect_case import judged
 from harness.cli import main
 from harness.errors import InputError
+from harness.history.bisect import Answer, Step, bisect, run_of
+from harness.history.bisect_case import judged
 from harness.record import Check, Verdict
 from tests.harness.tiny import SCENES
 

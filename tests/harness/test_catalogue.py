@@ -11,21 +11,21 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.camera import primary_rays
 from harness.data import scenes_root
-from harness.judge import CaseJudge
+from harness.judging.judge import CaseJudge
+from harness.judging.results import Contender, Result, Results
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.plan import Form, PreparedCase, light_role, prepare, trace_role
 from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Verdict
 from harness.renderers.base import Capability, Image, RayPaths, Status
-from harness.results import Contender, Result, Results
 from harness.scene import model
 from harness.scene.load import LoadedCase, load_cases, scene_files
 from harness.scene.resolve import expand_thin_slabs
 from harness.scene.resolved import ResolvedScene
-from harness.tree import light_on
-from harness.truth import ClosedForm
+from harness.truth.camera import primary_rays
+from harness.truth.paths import ClosedForm
+from harness.truth.tree import light_on
 
 TRUTH = Contender(
     "truth", "1", frozenset({Capability.RAYS, Capability.DOUBLE, Capability.DOUBLE_DATA}),

@@ -14,9 +14,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from harness.chord import Body
 from harness.expected import Float
-from harness.intervals import Chord
 from harness.scene.model import Icosphere
 from harness.scene.resolved import (
     Cone,
@@ -30,6 +28,8 @@ from harness.scene.resolved import (
     Sphere,
 )
 from harness.scene.shapes import solid_shape
+from harness.truth.chord import Body
+from harness.truth.intervals import Chord
 from tests.catalogue import EPS
 
 Inside = Callable[[Float], Float]

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.camera import primary_rays
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting
 from harness.diagnosis.hypothesis import plus_minus
@@ -20,7 +19,8 @@ from harness.record import Diagnosis, Summary
 from harness.renderers.base import Rays, Status
 from harness.scene.load import find
 from harness.scene.resolve import expand_thin_slabs
-from harness.truth import ClosedForm
+from harness.truth.camera import primary_rays
+from harness.truth.paths import ClosedForm
 from tests.fakes.student import Fault, student
 from tests.harness.tiny import SCENES, run_tiny
 from tests.mutants.test_outside_mutants import LAWS, PRINTED_TABLE, off_by

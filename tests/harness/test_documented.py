@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.documented import is_documented, known_here, known_in_run
-from harness.explain import explain_run
+from harness.judging.documented import is_documented, known_here, known_in_run
+from harness.judging.explain import explain_run
 from harness.plan import prepare
 from harness.record import Check, Diagnosis, SummaryCase, Verdict
 from harness.run import run

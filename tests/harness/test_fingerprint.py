@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from harness import bundle, fingerprint
+from harness import fingerprint
 from harness.errors import RendererMissing
 from harness.fingerprint import code_digest, combined, reached, versions
 from harness.renderers import registry
 from harness.renderers.command import CommandRenderer, Template
+from harness.running import bundle
 from tests.test_layering import ROOT, imports_of, longest_known, module_name, sources
 
 MODULES = {module_name(file): file for file in sources("harness", "tracer")}
@@ -51,7 +52,7 @@ def test_all_that_a_module_imports_is_found(module: str) -> None:
 
 def test_all_that_python_loads_is_found() -> None:
     script = (
-        "import sys, harness.judge, harness.archive\n"
+        "import sys, harness.judging.judge, harness.archive\n"
         "mine = {n: m for n, m in sys.modules.items() if n.startswith(('harness', 'tracer'))}\n"
         "print(*[n for n, m in mine.items() if m.__file__])"  # a folder has no code of its own
     )
@@ -60,13 +61,13 @@ def test_all_that_python_loads_is_found() -> None:
     )
     loaded = set(done.stdout.split())
     assert len(loaded) > 20
-    assert loaded <= reached(["harness.judge", "harness.archive"])
+    assert loaded <= reached(["harness.judging.judge", "harness.archive"])
 
 
 def test_what_renders_does_not_depend_on_what_judges() -> None:
     for adapter in ("povray", "tracer", "mitsuba"):
         found = reached([f"harness.renderers.{adapter}", *registry.HOSTING])
-        judging = {m for m in found if m.startswith(("harness.measure", "harness.judge"))}
+        judging = {m for m in found if m.startswith(("harness.measure", "harness.judging.judge"))}
         assert not judging
     assert "harness.translate.mitsuba" not in reached(["harness.renderers.povray"])
 

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from harness import show_history
 from harness.cli import main
 from harness.errors import InputError
-from harness.history import MOST_RUNS, History
+from harness.history import show as show_history
+from harness.history.revision import Revision, revision
+from harness.history.store import MOST_RUNS, History
 from harness.record import Summary
 from harness.report.history import write_history
-from harness.revision import Revision, revision
 from tests.fakes.student import student
 from tests.harness.tiny import checks_of, run_tiny
 
@@ -63,7 +63,7 @@ def test_old_runs_are_forgotten(
     history: History, summary: Summary, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert MOST_RUNS >= 1000
-    monkeypatch.setattr("harness.history.MOST_RUNS", 2)
+    monkeypatch.setattr("harness.history.store.MOST_RUNS", 2)
     for _ in range(4):
         history.add(summary, COMMIT, tmp_path)
     assert [run.id for run in history.runs()] == [3, 4]

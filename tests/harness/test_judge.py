@@ -10,8 +10,8 @@ import pytest
 
 from harness import plan
 from harness.errors import RendererFailed, RendererMissing, RendererUnsupported
-from harness.judge import CaseJudge, Judgement
-from harness.lanes import calibrate, perform
+from harness.judging.judge import CaseJudge, Judgement
+from harness.judging.results import Contender, Result, Results
 from harness.measure.observables import (
     IMPLIED_OBSERVABLES,
     RAY_API_OBSERVABLES,
@@ -20,7 +20,7 @@ from harness.measure.observables import (
 from harness.plan import PreparedCase, prepare
 from harness.record import Verdict
 from harness.renderers.base import Capability, RenderSettings
-from harness.results import Contender, Result, Results
+from harness.running.lanes import calibrate, perform
 from harness.scene.load import load_cases
 from harness.scene.model import CheckSpec
 from tests.fakes import FakeRenderer

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.camera import primary_rays
 from harness.errors import InputError, RendererUnsupported
 from harness.renderers.base import Capability, RenderSettings
 from harness.renderers.needs import needs
@@ -21,6 +20,7 @@ from harness.scene.resolve import resolve
 from harness.translate import mitsuba
 from harness.translate.mitsuba_scale import scaled
 from harness.translate.povray import translate
+from harness.truth.camera import primary_rays
 from tests.harness.povray_measure import needs_povray
 
 SCENES = Path(__file__).parents[2] / "scenes"

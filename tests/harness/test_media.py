@@ -13,7 +13,7 @@ from harness.expected import fresnel, refract
 from harness.renderers.base import Capability, Rays
 from harness.renderers.needs import needs
 from harness.translate.tracer import translate
-from harness.truth import ClosedForm
+from harness.truth.paths import ClosedForm
 from tests.harness.test_resolve import Document, box, problems_of, resolved_of, scene, sphere
 from tracer.image import render
 from tracer.path import TIR, follow

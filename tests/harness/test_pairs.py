@@ -10,16 +10,16 @@ import pytest
 
 from harness import plan
 from harness.errors import RendererFailed, RendererUnsupported
-from harness.judge import CaseJudge
-from harness.lanes import calibrate, perform
+from harness.judging.judge import CaseJudge
+from harness.judging.pairs import camera_shift
+from harness.judging.results import Contender, Result, Results
 from harness.measure.images import box_downsample
 from harness.measure.observables import Observable
 from harness.measure.pictures import GRAZING, MOST_GRAZING, PicturePair
-from harness.pairs import camera_shift
 from harness.plan import PreparedCase
 from harness.record import Check, Verdict
 from harness.renderers.base import Capability, Image, Renderer, RenderSettings
-from harness.results import Contender, Result, Results
+from harness.running.lanes import calibrate, perform
 from harness.scene.model import CheckSpec
 from harness.scene.resolved import Film, ResolvedScene
 from tests.fakes import FakeRenderer

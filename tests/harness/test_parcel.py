@@ -18,7 +18,12 @@ from harness.errors import (
     RendererMissing,
     RendererUnsupported,
 )
-from harness.parcel import (
+from harness.judging.results import Contender
+from harness.plan import Job, jobs_of
+from harness.preflight import Preflight
+from harness.record import Verdict
+from harness.renderers.base import Capability, Image, RayPaths, RenderSettings
+from harness.running.parcel import (
     Parcel,
     job_key,
     pack_contender,
@@ -28,11 +33,6 @@ from harness.parcel import (
     unpack_job,
     unpack_result,
 )
-from harness.plan import Job, jobs_of
-from harness.preflight import Preflight
-from harness.record import Verdict
-from harness.renderers.base import Capability, Image, RayPaths, RenderSettings
-from harness.results import Contender
 from tests.harness.tiny import prepared
 
 SETTINGS = RenderSettings()

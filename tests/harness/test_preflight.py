@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from harness.chart import chart, srgb_decode, srgb_encode
 from harness.expected import Float
 from harness.preflight import FINEST, FLOAT32, FLOAT64, Preflight, preflight, stored_as
+from harness.probe.chart import chart, srgb_decode, srgb_encode
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer

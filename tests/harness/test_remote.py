@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import remote
 from harness.cache.entry import Entry
 from harness.errors import (
     ConnectionLost,
@@ -20,10 +19,11 @@ from harness.errors import (
     RendererUnsupported,
 )
 from harness.record import Verdict
-from harness.remote import ATTEMPTS, Origin, RemoteRenderer
 from harness.renderers import registry
 from harness.renderers.base import Image, RayPaths, Renderer, RenderSettings
 from harness.run import run
+from harness.running import remote
+from harness.running.remote import ATTEMPTS, Origin, RemoteRenderer
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer
 from tests.fakes.student import student
@@ -201,7 +201,7 @@ def test_a_time_out_of_the_future_itself_is_not_waited_for(there: dict[str, Rend
 
 @pytest.mark.parametrize("text", ["", "local", "local:0", "local:x", "http://a", "tcp://", "a:1"])
 def test_what_is_no_cluster(text: str) -> None:
-    from harness.cluster import connected
+    from harness.running.cluster import connected
 
     with pytest.raises(InputError, match="no cluster"), connected(text):
         pass

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from harness import bundle, documents, record
+from harness import documents, record
 from harness.archive import Archive, folder_name
 from harness.cache.cache import Cache, open_cache
 from harness.errors import InputError, RendererFailed
 from harness.record import CaseRecord, Effort, Summary, Verdict
 from harness.renderers.base import Image, RenderSettings
 from harness.run import EXIT_INTERRUPTED, UNFINISHED, Progress, run
+from harness.running import bundle
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer
 from tests.fakes.student import CAPABILITIES, student
@@ -341,6 +342,6 @@ def test_a_renderer_without_room_for_its_files_is_not_to_blame(
 
     summary, _ = go(tmp_path / "a", None, Cramped())  # it says so, but there is room
     assert {check.status for check in checks_of(summary)} == {Verdict.ERROR}
-    monkeypatch.setattr("harness.lanes.SPARE_BYTES", 2**62)
+    monkeypatch.setattr("harness.running.lanes.SPARE_BYTES", 2**62)
     with pytest.raises(OSError, match="No space left"):
         go(tmp_path / "a", None, Cramped())

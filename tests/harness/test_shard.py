@@ -13,11 +13,11 @@ from harness import record
 from harness.archive import folder_name
 from harness.cli.shards import divided
 from harness.errors import InputError, RendererMissing
-from harness.merge import merge
 from harness.record import CaseRecord, Summary, Verdict
 from harness.renderers.base import Renderer
 from harness.run import run
-from harness.shard import Shard, ShardNote, divide, read_times, write_note
+from harness.running.merge import merge
+from harness.running.shard import Shard, ShardNote, divide, read_times, write_note
 from tests.fakes.student import student
 from tests.harness.test_run import Absent
 from tests.harness.tiny import checks_of, prepared

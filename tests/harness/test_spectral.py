@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import plan, spectral
+from harness import plan
 from harness.errors import RendererError, RendererFailed
-from harness.lanes import perform
+from harness.judging import spectral
+from harness.judging.results import Result
 from harness.plan import PreparedCase
 from harness.renderers.base import Capability, Image, RenderSettings
 from harness.renderers.tracer import TracerEngine
-from harness.results import Result
+from harness.running.lanes import perform
 from harness.scene.load import load_cases
 
 SCENES = Path(__file__).parents[2] / "scenes"

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Sphere
-from harness.tree import branches, light_around, light_on, natural_weight
-from harness.truth import ClosedForm
+from harness.truth.paths import ClosedForm
+from harness.truth.tree import branches, light_around, light_on, natural_weight
 from tests.catalogue import EPS, Row, numbers, rows
 from tests.harness.scenes import face, fan, parallel, prism, scene, slab
 

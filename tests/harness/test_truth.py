@@ -21,7 +21,7 @@ from harness.scene import resolved as rs
 from harness.scene.model import Box, Icosphere, Rotation
 from harness.scene.resolved import ResolvedScene, Sphere
 from harness.scene.shapes import polygons, solid_shape
-from harness.truth import ClosedForm, TruePaths
+from harness.truth.paths import ClosedForm, TruePaths
 from tests.catalogue import EPS, Row, numbers, rows
 from tests.harness.scenes import angle, face, fan, parallel, prism, scene, slab, unit
 

@@ -9,11 +9,11 @@ import pytest
 
 from harness.data import scenes_root
 from harness.errors import InputError
-from harness.judge import CaseJudge
+from harness.judging.judge import CaseJudge
+from harness.judging.results import Results
 from harness.plan import Form, PreparedCase, prepare, trace_role
 from harness.record import Check, Verdict
 from harness.renderers.base import RayPaths
-from harness.results import Results
 from harness.scene import resolved as rs
 from harness.scene.load import load_cases
 from tests.harness.test_catalogue import TRUTH, measured_by_truth

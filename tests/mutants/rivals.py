@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.chart import srgb_encode
 from harness.expected import Float
 from harness.measure.images import ssim
+from harness.probe.chart import srgb_encode
 
 SAMPLES = 256
 

@@ -13,8 +13,8 @@ import pytest
 from click.testing import CliRunner
 
 from harness import cli
-from harness.chart import srgb_decode, srgb_encode
 from harness.expected import Float
+from harness.probe.chart import srgb_decode, srgb_encode
 from harness.record import Check, Verdict
 from harness.renderers import registry
 from harness.renderers.base import Capability

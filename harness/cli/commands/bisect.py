@@ -49,8 +49,8 @@ def command(
     Every commit is tried in a folder of its own; your files stay as they are. Commits that cannot
     be built or run are skipped.
     """
-    from harness.bisect import Step, bisect, run_of
-    from harness.bisect_case import verdict_of_case
+    from harness.history.bisect import Step, bisect, run_of
+    from harness.history.bisect_case import verdict_of_case
 
     def report(step: Step) -> None:
         click.echo(f"{step.commit[:10]} {step.answer}: {step.why}  ({step.subject})")

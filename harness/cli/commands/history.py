@@ -29,9 +29,9 @@ def command(
     import dataclasses
     import json
 
-    from harness import show_history
     from harness.errors import InputError, nearest
-    from harness.history import History, history_file
+    from harness.history import show as show_history
+    from harness.history.store import History, history_file
     from harness.report.history import write_history
 
     history = History(history_file())

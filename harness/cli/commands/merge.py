@@ -30,8 +30,8 @@ def command(folder: tuple[Path, ...], out: Path, scenes: Path | None, history: b
     """
     from harness import show
     from harness.errors import InputError
-    from harness.merge import merge
     from harness.report import write_report
+    from harness.running.merge import merge
 
     line = " ".join(["snellcheck", *sys.argv[1:]])
     try:

@@ -113,7 +113,7 @@ def command(
     from harness.report import write_report
     from harness.run import UNFINISHED
     from harness.run import run as run_cases
-    from harness.shard import NOTE, write_note
+    from harness.running.shard import NOTE, write_note
 
     cache, note = None if no_cache else open_cache(cache_at), None
     with show.progress() as progress, places(cluster_at) as place:

@@ -10,10 +10,10 @@ from pathlib import Path
 from harness import record
 from harness.archive import Archive, folder_name
 from harness.errors import InputError, Problem
-from harness.explain import explain_run
+from harness.judging.explain import explain_run
 from harness.plan import PreparedCase
 from harness.record import Counts, Effort, RendererSummary, Summary, SummaryCase, Verdict
-from harness.shard import ShardNote, read_note, write_times
+from harness.running.shard import ShardNote, read_note, write_times
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from harness.errors import InputError
-from harness.revision import git
+from harness.history.revision import git
 
 
 class Answer(StrEnum):

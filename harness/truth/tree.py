@@ -1,8 +1,8 @@
 """The truth of all paths at once: each ray becomes two at every interface, in closed form.
 
-Where `harness.truth` follows one stated path, this follows the whole tree that double recursion
-makes, branch by branch, for many rays at a time. It says which other paths share a pixel, how much
-light all paths together bring, and what nature would have made of it.
+Where `harness.truth.paths` follows one stated path, this follows the whole tree that double
+recursion makes, branch by branch, for many rays at a time. It says which other paths share a pixel,
+how much light all paths together bring, and what nature would have made of it.
 
 *Nature* is polarised. Natural light is two independent waves, polarised across each other; each is
 split into its parts along and across every plane of incidence, and those have Fresnel coefficients
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from harness.expected import Float, fresnel, reflect, refract
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Rectangle
-from harness.truth import Boundary, ClosedForm
+from harness.truth.paths import Boundary, ClosedForm
 
 Complex = NDArray[np.complex128]
 

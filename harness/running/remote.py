@@ -1,7 +1,7 @@
 """Renderers on other machines: a job travels whole, in one parcel, and its result comes back so.
 
-What carries the parcels is any `concurrent.futures.Executor` (`harness.cluster` has Dask's). The
-other side needs snellcheck and the renderer, and nothing else: no shared disk, no open port of
+What carries the parcels is any `concurrent.futures.Executor`: `harness.running.cluster` has Dask's.
+The other side needs snellcheck and the renderer, and nothing else: no shared disk, no open port of
 ours, no scene files.
 """
 
@@ -18,8 +18,7 @@ from typing import Any, Literal
 
 from harness.cache.entry import Entry, decode
 from harness.errors import ConnectionLost, RendererError, RendererFailed, SnellcheckError
-from harness.lanes import perform
-from harness.parcel import Parcel, pack_job, pack_result, unpack_job, unpack_result
+from harness.judging.results import Result
 from harness.plan import Job
 from harness.renderers import registry
 from harness.renderers.base import (
@@ -31,7 +30,8 @@ from harness.renderers.base import (
     Renderer,
     RenderSettings,
 )
-from harness.results import Result
+from harness.running.lanes import perform
+from harness.running.parcel import Parcel, pack_job, pack_result, unpack_job, unpack_result
 from harness.scene.resolved import ResolvedScene
 
 ATTEMPTS = 4  # of a job whose worker was lost; one that kills every worker is to blame itself

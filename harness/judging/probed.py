@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from harness import plan
+from harness.judging.results import Contender, NotAvailable, Results
 from harness.measure.images import Pixels
 from harness.measure.probe_truth import ProbeTruth, probe_truth
 from harness.measure.raymap import ProbeRays
@@ -16,7 +17,6 @@ from harness.plan import Form, PreparedCase
 from harness.probe.scenes import AXES
 from harness.record import Verdict
 from harness.renderers.base import Capability, RayPaths
-from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolve import expand_thin_slabs
 

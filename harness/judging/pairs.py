@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from harness import plan
 from harness.errors import SnellcheckError
 from harness.expected import Float
+from harness.judging.results import Contender, NotAvailable, Results
 from harness.measure.comparison import Unmeasurable
 from harness.measure.images import Pixels, box_downsample
 from harness.measure.observables import Observable
@@ -26,7 +27,6 @@ from harness.measure.probe_truth import ROUNDINGS
 from harness.preflight import FLOAT32
 from harness.record import Check, Verdict
 from harness.renderers.base import Capability, Image
-from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolved import ResolvedScene
 from harness.verdict import check_id, judge, unmeasured

@@ -10,8 +10,9 @@ from harness import plan
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting, landings, levels
 from harness.diagnosis.whole_run import Witness, diagnose_run
-from harness.documented import is_documented, known_here, known_in_run
 from harness.errors import ImageNotFinite
+from harness.judging.documented import is_documented, known_here, known_in_run
+from harness.judging.results import FAILED_PREFLIGHT, Contender, NotAvailable, Results
 from harness.measure.comparison import Unmeasurable
 from harness.measure.images import Pixels
 from harness.measure.observables import DIRECTION_OBSERVABLES, Observable
@@ -21,7 +22,6 @@ from harness.measure.rays import RayMeasurement
 from harness.plan import PreparedCase
 from harness.record import Cause, Check, Diagnosis, SummaryCase, Verdict
 from harness.renderers.base import Capability, Rays, Status
-from harness.results import FAILED_PREFLIGHT, Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolve import expand_thin_slabs
 from harness.scene.resolved import ThinSlab

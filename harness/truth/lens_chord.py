@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.expected import Float
-from harness.intervals import Chord, both, planes_chord, without
 from harness.scene.resolved import Cone, Frame, Lens
+from harness.truth.intervals import Chord, both, planes_chord, without
 
 Mask = NDArray[np.bool_]
 

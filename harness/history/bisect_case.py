@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from harness.bisect import Answer
 from harness.errors import InputError
+from harness.history.bisect import Answer
 from harness.record import Check, Verdict, read_summary
 
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from harness.errors import RendererError, RendererFailed
 from harness.expected import Float
+from harness.judging.results import Result
 from harness.plan import pass_role
 from harness.renderers.base import Image
-from harness.results import Result
 
 # With fewer bands than primaries, or with bands all alike, colours cannot be told apart.
 ILL_CONDITIONED = 1e3

@@ -11,7 +11,10 @@ from dataclasses import dataclass
 
 from harness.cache.cache import Cache
 from harness.fingerprint import code_digest, combined
-from harness.parcel import (
+from harness.judging.results import Contender, Result
+from harness.plan import Job
+from harness.renderers.base import Renderer, RenderSettings
+from harness.running.parcel import (
     Parcel,
     job_key,
     pack_contender,
@@ -19,9 +22,6 @@ from harness.parcel import (
     unpack_contender,
     unpack_result,
 )
-from harness.plan import Job
-from harness.renderers.base import Renderer, RenderSettings
-from harness.results import Contender, Result
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from harness.expected import Float
-from harness.intervals import Chord, planes_chord
-from harness.lens_chord import cone_chord, lens_chords
 from harness.scene.resolved import Cone, Convex, Cylinder, Lens, Mesh, Solid, Sphere
+from harness.truth.intervals import Chord, planes_chord
+from harness.truth.lens_chord import cone_chord, lens_chords
 
 
 def _sphere_chord(sphere: Sphere, o: Float, d: Float) -> Chord:

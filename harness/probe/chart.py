@@ -11,7 +11,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.camera import primary_rays
 from harness.expected import Float
 from harness.probe.scenes import AXES
 from harness.renderers.base import Image
@@ -27,6 +26,7 @@ from harness.scene.resolved import (
     Surface,
     Transport,
 )
+from harness.truth.camera import primary_rays
 
 Mask = NDArray[np.bool_]
 

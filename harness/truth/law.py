@@ -1,8 +1,8 @@
 """What happens to rays at an interface and between two: physics, or what a wrong renderer does.
 
-`harness.truth` follows rays by a `Law`. Its defaults are the closed forms of `harness.expected`. A
-diagnosis puts one rule of a wrong renderer in the place of one of them, and asks whether the images
-come out as measured.
+`harness.truth.paths` follows rays by a `Law`. Its defaults are the closed forms of
+`harness.expected`. A diagnosis puts one rule of a wrong renderer in the place of one of them, and
+asks whether the images come out as measured.
 """
 
 from __future__ import annotations

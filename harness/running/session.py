@@ -8,19 +8,30 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 
-from harness import bundle, plan, spectral
+from harness import plan
 from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
-from harness.judge import CaseJudge
-from harness.lanes import Calibrated, Done, Event, Halted, Lane, MakeExecutor, Surroundings, threads
-from harness.memo import Memo
-from harness.pairs import camera_shift
+from harness.judging import spectral
+from harness.judging.judge import CaseJudge
+from harness.judging.pairs import camera_shift
+from harness.judging.results import Contender, Result, Results
 from harness.plan import Job, PreparedCase
 from harness.record import CaseRecord, Effort, SummaryCase, Verdict
 from harness.renderers.base import Renderer, RenderSettings
 from harness.renderers.process_tree import Running
-from harness.results import Contender, Result, Results
+from harness.running import bundle
+from harness.running.lanes import (
+    Calibrated,
+    Done,
+    Event,
+    Halted,
+    Lane,
+    MakeExecutor,
+    Surroundings,
+    threads,
+)
+from harness.running.memo import Memo
 from harness.verdict import unmeasured
 
 

@@ -14,15 +14,15 @@ from harness.archive import Archive, belongs, folder_name
 from harness.cache.cache import Cache
 from harness.errors import InputError, RendererError, RendererFailed
 from harness.fingerprint import code_digest, combined, versions
-from harness.memo import Memo
-from harness.parcel import pack_contender
+from harness.judging.results import Contender, Result
 from harness.plan import PreparedCase
 from harness.record import CaseRecord, read_case, write_bytes
 from harness.renderers.base import Image, RenderSettings
-from harness.results import Contender, Result
+from harness.running.memo import Memo
+from harness.running.parcel import pack_contender
 
 # What plans, judges and draws a case.
-CODE = ("harness.plan", "harness.judge", "harness.archive", "harness.baseline.stand_in")
+CODE = ("harness.plan", "harness.judging.judge", "harness.archive", "harness.baseline.stand_in")
 COMPUTING = ("numpy", "scipy", "scikit-image", "colour-science", "imagecodecs", "OpenEXR")
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.chord import Body
 from harness.expected import Float, reflect
-from harness.intervals import Chord
-from harness.law import PHYSICS, Interface, Law, Leg
 from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
 from harness.scene.resolved import Mesh, Rectangle, ResolvedScene
+from harness.truth.chord import Body
+from harness.truth.intervals import Chord
+from harness.truth.law import PHYSICS, Interface, Law, Leg
 
 # Two roots for one face, each from a few roundings of the scene's coordinates.
 MEETING = 64 * np.finfo(float).eps

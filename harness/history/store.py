@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import InputError
+from harness.history.revision import Revision
 from harness.record import Summary
-from harness.revision import Revision
 
 MOST_RUNS = 2000  # a run of 500 checks takes some 50 KB
 BUSY_S = 30.0  # two runs may end at the same time

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from harness.errors import ConnectionLost, InputError
-from harness.remote import Origin, RemoteRenderer
+from harness.running.remote import Origin, RemoteRenderer
 
 INSTALL = "pip install 'snellcheck[cluster]'"
 CONNECT_S = 10.0

@@ -24,11 +24,11 @@ from harness.errors import (
     RendererMissing,
     RendererUnsupported,
 )
+from harness.judging.results import Contender, Result
 from harness.plan import Job
 from harness.preflight import Preflight
 from harness.record import Verdict
 from harness.renderers.base import Capability, Image, RayPaths, RenderSettings
-from harness.results import Contender, Result
 from harness.scene.resolved import ResolvedScene
 
 LAYOUT = 2  # of parcels; part of every key

@@ -9,9 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from harness import plan, spectral
-from harness.attribution import attributed
-from harness.explain import Explainer
+from harness import plan
+from harness.judging import spectral
+from harness.judging.attribution import attributed
+from harness.judging.explain import Explainer
+from harness.judging.pairs import PairJudge
+from harness.judging.probed import Probed
+from harness.judging.results import Contender, NotAvailable, Results
 from harness.measure import (
     flat_observables,
     focus_observables,
@@ -31,13 +35,10 @@ from harness.measure.observables import (
 )
 from harness.measure.raymap import ProbeRays
 from harness.measure.statistics import Noise
-from harness.pairs import PairJudge
 from harness.plan import Form, PreparedCase
 from harness.preflight import Preflight
-from harness.probed import Probed
 from harness.record import Check, Curve, Diagnosis, Verdict
 from harness.renderers.base import Capability
-from harness.results import Contender, NotAvailable, Results
 from harness.scene import model
 from harness.scene.resolved import ResolvedScene
 from harness.verdict import check_id, judge, unmeasured

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from harness.history import Point, Run
+from harness.history.store import Point, Run
 from harness.record import Curve, Series
 
 Figure = Callable[[Point], float | None]

@@ -19,16 +19,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from harness.cache.cache import Cache
-from harness.camera import primary_rays
 from harness.errors import ConnectionLost, RendererError, RendererFailed, RendererMissing
-from harness.memo import Memo, memo_of
+from harness.judging.results import FAILED_PREFLIGHT, Contender, Result
 from harness.plan import Job
 from harness.preflight import Render, preflight
 from harness.record import Verdict
 from harness.renderers.base import Image, RayTracingRenderer, Renderer, RenderSettings
 from harness.renderers.process_tree import Running, belong_to
-from harness.results import FAILED_PREFLIGHT, Contender, Result
+from harness.running.memo import Memo, memo_of
 from harness.scene.resolved import ResolvedScene
+from harness.truth.camera import primary_rays
 
 # With less room than this in the temporary folder, a failure to write is the disk's.
 SPARE_BYTES = 16 * 2**20

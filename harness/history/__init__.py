@@ -1,0 +1,1 @@
+"""Figures of past runs: kept, shown, and followed to the commit that changed them."""

@@ -1,0 +1,1 @@
+"""From what renderers delivered to verdicts, and who is off, and why."""

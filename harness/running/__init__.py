@@ -1,0 +1,1 @@
+"""Carrying a plan out: lanes of renderers, what is known already, shards, clusters."""
