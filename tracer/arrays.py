@@ -162,7 +162,7 @@ class _Flattener:
         rows = [bound_row(bound, number) for bound, number in found]
         match shape:
             case Sphere(center, radius):
-                kind, rows = SPHERE, [[*center, radius]]
+                kind, rows, ball = SPHERE, [[*center, radius]], [*center, radius * radius]
             case Cell(_, center, radius):
                 kind, ball = CELL, [*center, radius * radius * (1.0 + 1e-9)]
             case Compound(where, center, radius):
@@ -174,6 +174,7 @@ class _Flattener:
             case Mesh():
                 kind, first, count = MESH, self.nodes, self.triangles
                 normals = self._tree(grow_tree(shape))
+                ball = _ball_around(shape.vertices)
         self.rows += rows
         self.objects.append([kind, first, count, material, *media, pattern, normals])
         self.balls.append(ball)
@@ -244,6 +245,12 @@ def _light(light: PointLight | DirectionalLight) -> list[float]:
     if isinstance(light, PointLight):
         return [*light.position, *light.intensity, POINT]
     return [*(-x for x in light.direction), *light.irradiance, DIRECTIONAL]
+
+
+def _ball_around(points: Floats) -> list[float]:
+    """Centre and squared radius of a ball that holds the points; not the smallest one."""
+    center = (points.min(axis=0) + points.max(axis=0)) / 2
+    return [*center.tolist(), float(((points - center) ** 2).sum(axis=1).max())]
 
 
 def _table(rows: list[list[float]], columns: int) -> Floats:

@@ -34,6 +34,7 @@ from tracer.shapes import (
     sphere_stretch,
     vec_at,
 )
+from tracer.shared import OF_PLACES
 from tracer.vector import Vec, along, dot, scale, sub
 
 NOTHING = -1
@@ -77,9 +78,10 @@ def nearest_hit(
 
     The ray has just left face `left_face` of object `left`, heading to the inside of it if
     `inward`; or nothing, if `left` is NOTHING. Boundaries of solids where a solid of higher rank
-    is on both sides are passed over.
+    is on both sides are passed over. Where two of them are nearer to each other than rounding, each
+    seems to lie before the other; a ray that makes no way there goes on beyond both.
     """
-    travelled = 0.0
+    travelled, waiting = 0.0, 0
     while True:
         hit = _next_hit(scene, o, d, medium, left, left_face, inward, stack)
         visible = hit.object == NOTHING or hit.object >= scene.solids or hit.beyond != hit.medium
@@ -87,8 +89,20 @@ def nearest_hit(
             return Hit(
                 hit.object, hit.face, travelled + hit.t, hit.entering, hit.medium, hit.beyond
             )
-        o, travelled, medium = along(o, hit.t, d), travelled + hit.t, hit.medium
+        rounding = _rounding(scene, hit.object)
+        waiting = waiting + 1 if hit.t <= rounding else 0
+        step = hit.t
         left, left_face, inward = hit.object, hit.face, hit.entering
+        if waiting > len(scene.objects):
+            waiting, step, left, left_face = 0, rounding, NOTHING, -1
+        o, travelled, medium = along(o, step, d), travelled + step, hit.medium
+
+
+@inlined
+def _rounding(scene: Arrays, solid: int) -> float:
+    """How far rounding may move where a ray meets a solid."""
+    center = vec_at(scene.balls, solid, 0)
+    return OF_PLACES * float(np.sqrt(dot(center, center)) + np.sqrt(scene.balls[solid, 3]))
 
 
 @inlined
