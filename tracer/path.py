@@ -240,7 +240,7 @@ def _follow(
     for i in range(begin, end):
         o = (origins[i, 0], origins[i, 1], origins[i, 2])
         d = (directions[i, 0], directions[i, 1], directions[i, 2])
-        k = i if len(found.vertices) else 0
+        k = i if len(found.vertices) == len(origins) else 0  # all share one row that is empty
         log = Log(
             found.vertices[k],
             found.solid[k],
