@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -23,7 +24,7 @@ from harness.baseline.document import MOST_EARLIER, Approval, Kept, identity, wr
 from harness.baseline.pictures import keep
 from harness.baseline.run_folder import RunFolder, baseline_of, inside, measured_of, refusal
 from harness.baseline.source import Baselines
-from harness.documents import Model, read
+from harness.documents import Model, read, write_bytes
 from harness.errors import InputError, Problem, nearest
 from harness.record import BaselineState, CaseRecord, Check, ImageFile, RendererRun, Verdict
 from harness.scene.load import pattern
@@ -181,14 +182,22 @@ def approve(
     plans: Sequence[Plan], run: RunFolder, folder: Path, by: str, store: Store | None = None
 ) -> list[Path]:
     """Writes the baselines of `plans` below `folder`; returns the files written."""
-    written = []
-    for one in (p for p in plans if p.needed):
-        file = baseline_file(folder, one.record.id, one.run.name)
-        images = [
-            keep(image, inside(run.folder, image.path), file.with_suffix(".png"), store)
-            for image in one.run.images
-            if _worth_keeping(image, one.record, one.run)
+    needed = [one for one in plans if one.needed]
+    with tempfile.TemporaryDirectory() as staging:
+        # All pictures are read and encoded before anything is written: one may be refused.
+        pictures = [
+            [
+                keep(image, inside(run.folder, image.path), _staged(staging, folder, one), store)
+                for image in one.run.images
+                if _worth_keeping(image, one.record, one.run)
+            ]
+            for one in needed
         ]
+        for file in sorted(Path(staging).rglob("*.png")):
+            write_bytes(folder / file.relative_to(staging), file.read_bytes())
+    written = []
+    for one, images in zip(needed, pictures, strict=True):
+        file = baseline_file(folder, one.record.id, one.run.name)
         approval = Approval(
             at=datetime.now(UTC).replace(microsecond=0).isoformat(), by=by, reason=one.reason,
             commit=_said_by_git("rev-parse", "HEAD"), version=one.run.version,
@@ -197,6 +206,12 @@ def approve(
         write_baseline(baseline_of(one.record, one.run, approval, images, _earlier(one.kept)), file)
         written.append(file)
     return written
+
+
+def _staged(staging: str, folder: Path, one: Plan) -> Path:
+    """Where the picture of a plan waits until all of them are there."""
+    file = baseline_file(folder, one.record.id, one.run.name).with_suffix(".png")
+    return Path(staging) / file.relative_to(folder)
 
 
 def baseline_file(folder: Path, case: str, renderer: str) -> Path:

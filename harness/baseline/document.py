@@ -39,7 +39,9 @@ class Approval(Model):
 
 
 class StoredImage(Model):
-    """A picture as 16-bit linear PNG in which 65535 stands for the radiance `scale`.
+    """A picture as 16-bit linear PNG, from 0 for the radiance `darkest` to 65535 for `scale` more.
+
+    `darkest` is below zero where a colour of the spectrum lies outside of linear sRGB.
 
     It lies in `file` beside the baseline, or in a store under `sha256`, or nowhere: then only
     `pixels_sha256` and the means tell whether a picture has changed.
@@ -53,6 +55,7 @@ class StoredImage(Model):
     width: int = Field(ge=1, le=8192)
     height: int = Field(ge=1, le=8192)
     scale: float = Field(gt=0, allow_inf_nan=False)
+    darkest: float = Field(default=0.0, le=0, allow_inf_nan=False)
     mean: list[float] = Field(default_factory=list)
     mean_error: list[float] = Field(default_factory=list)
 

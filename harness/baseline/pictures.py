@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness import imagefile
 from harness.baseline.document import StoredImage
@@ -37,14 +38,13 @@ def keep(source: ImageFile, exr: Path, target: Path, store: Store | None) -> Sto
     pixels, info = imagefile.read(exr, size=(source.width, source.height))
     if info.nonfinite:
         raise InputError.of(f"{info.nonfinite} pixels are not finite", file=exr)
-    scale = float(max(pixels.max(), 1e-6))
-    if pixels.min() < 0:
-        raise InputError.of("has pixels of negative radiance", file=exr)
+    darkest = float(min(pixels.min(), 0.0))
+    scale = float(max(pixels.max() - darkest, 1e-6))
     known = StoredImage(
         role=source.role, pixels_sha256=source.sha256, width=source.width, height=source.height,
-        scale=scale, mean=source.mean, mean_error=source.mean_error,
+        scale=scale, darkest=darkest, mean=source.mean, mean_error=source.mean_error,
     )  # fmt: skip
-    data = _encoded(pixels, scale)
+    data = _encoded((pixels - darkest) / scale)
     digest = hashlib.sha256(data).hexdigest()
     if len(data) <= LARGEST_IN_GIT:
         write_bytes(target, data)
@@ -66,12 +66,12 @@ def restore(image: StoredImage, data: bytes, name: Path) -> Pixels:
             pixels, _ = imagefile.read(file, encoding="linear", size=(image.width, image.height))
         except InputError as error:
             raise InputError([replace(problem, file=name) for problem in error.problems]) from error
-    return (pixels.astype(np.float64) * image.scale).astype(np.float32)
+    return (pixels.astype(np.float64) * image.scale + image.darkest).astype(np.float32)
 
 
-def _encoded(pixels: Pixels, scale: float) -> bytes:
+def _encoded(shares: NDArray[np.floating]) -> bytes:
+    """Shares of the whole range, 0 to 1; as floats they round by 1/256 of a step at most."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "picture.png"
-        shares = (pixels / scale).astype(np.float32)  # rounds by 1/256 of a step at most
-        imagefile.write_png(file, shares, bits=16, encoding="linear")
+        imagefile.write_png(file, shares.astype(np.float32), bits=16, encoding="linear")
         return file.read_bytes()

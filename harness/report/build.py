@@ -6,7 +6,10 @@ unreadable or missing is shown as such: the report of a broken run is the one th
 
 from __future__ import annotations
 
+import hashlib
 import importlib.resources
+import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 PACKAGE = "harness.report"
 ASSETS = ("report.css", "report.js")
 COARSE = 180  # pictures narrower than this are shown enlarged, so let their pixels be seen
+OF_RUN = re.compile(r'<meta name="snellcheck-run" content="[^"]*">')
 GENERATOR = '<meta name="generator" content="snellcheck'
 
 
@@ -49,6 +53,13 @@ def write_report(run_folder: Path) -> Path:
     index = run_folder / "index.html"
     records.write_text(index, report.index(rows))
     return index
+
+
+def _own_digest() -> str:
+    """A hash of the code and the templates that make pages."""
+    here = Path(__file__).parent
+    files = sorted([*here.glob("*.py"), *here.glob("templates/*.j2")])
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -74,6 +85,7 @@ class _Report:
         self.renderers = view.renderer_names(summary)
         self.colours = colour_classes(self.renderers)
         self.trends = Trends(self.renderers, self.colours)
+        self.code = _own_digest()
         self.stray: list[str] = []  # record files that belong to no case of the summary
         self.environment = environment()
         self.absent = {name for name, known in summary.renderers.items() if known.status != "ok"}
@@ -102,7 +114,7 @@ class _Report:
             if case is None:
                 self.stray.append(path.name)
                 continue
-            records.write_text(self._page_path(case), self.case(record, path))
+            self._write_case(self._page_path(case), record, path)
             rows[case.id] = self._row(case, record, "")
             for curve in record.curves:
                 self.trends.add(curve)
@@ -126,7 +138,29 @@ class _Report:
         )
         return view.line(row, Markup(self.row_template.render(row=row, absent=self.absent)))
 
-    def case(self, record: CaseRecord, path: Path) -> str:
+    def _write_case(self, page: Path, record: CaseRecord, path: Path) -> None:
+        """Writes the page of a case, or only names the run in it where all else is as it was."""
+        stamp = self._stamp(record, path)
+        written = page.read_text(encoding="utf-8") if page.is_file() else ""
+        if f'<meta name="snellcheck-page" content="{stamp}">' in written[:2000]:
+            told = f'<meta name="snellcheck-run" content="{clean(self.summary.started)}">'
+            records.write_text(page, OF_RUN.sub(lambda _: told, written, count=1))
+        else:
+            records.write_text(page, self.case(record, path, stamp))
+
+    def _stamp(self, record: CaseRecord, path: Path) -> str:
+        """A hash of all that a case's page shows, but for the time of the run."""
+        images = [image for run in record.runs for image in run.images]
+        named = [*record.files.values(), record.pack, *record.other_packs.values()]
+        named += [d.path for d in record.differences]
+        named += [name for image in images for name in (image.path, image.picture)]
+        folder = RunFolder(self.folder)
+        there = [folder.href(name) for name in named if name]
+        neighbours = repr(self._neighbours(record.id))
+        shown = [self.code, self.summary.snellcheck_version, dict(self.colours), there, neighbours]
+        return hashlib.sha256(path.read_bytes() + json.dumps(shown).encode()).hexdigest()
+
+    def case(self, record: CaseRecord, path: Path, stamp: str) -> str:
         folder = RunFolder(self.folder, up="../")
         runs = [
             (run, verdict, [view.picture(image, folder) for image in run.images])
@@ -137,6 +171,7 @@ class _Report:
         name, parameters = view.split_id(record.id)
         checks = view.sorted_views(record.checks)
         return self.environment.get_template("case.html.j2").render(
+            stamp=stamp,
             record=record,
             name=name,
             id_parameters=parameters,

@@ -29,7 +29,7 @@ from harness.record import (
     Table,
     Verdict,
 )
-from harness.report import write_report
+from harness.report import build, write_report
 from harness.report.colours import colour_classes
 from harness.report.links import RunFolder, clean, page_name
 from tests.harness.report_fixture import (
@@ -538,3 +538,30 @@ def test_a_renderer_that_nothing_was_checked_of_has_not_passed(tmp_path: Path) -
     (page,) = (p for p in pages(tmp_path) if p.path.parent.name == "cases")
     scores = [a for _, a in page.elements if "data-renderer" in a]
     assert [a["data-renderer"] for a in scores] == ["tracer"]
+
+
+def test_a_page_that_would_be_the_same_is_not_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = small_run(tmp_path, passing())
+    write_report(root)
+    (page,) = (root / "cases").glob("*.html")
+    before = page.read_text(encoding="utf-8")
+    made: list[str] = []
+    whole = build._Report.case
+
+    def counted(self: build._Report, record: CaseRecord, path: Path, stamp: str) -> str:
+        made.append(record.id)
+        return whole(self, record, path, stamp)
+
+    monkeypatch.setattr(build._Report, "case", counted)
+    small_run(tmp_path, passing(), started="2031-05-06T07:08:09+00:00")
+    write_report(root)
+    assert made == []
+    after = page.read_text(encoding="utf-8")
+    assert "2031-05-06T07:08:09+00:00" in after
+    assert after != before  # it names the run that it is a page of
+    small_run(tmp_path, passing().model_copy(update={"title": "Another"}))
+    write_report(root)
+    assert made == [passing().id]
+    assert "Another" in page.read_text(encoding="utf-8")
