@@ -44,6 +44,12 @@ def selector(
     return select
 
 
+def of_run(run: RunFolder, wanted: Wanted) -> Wanted:
+    """`wanted`, but of cases that the run set out to do alone."""
+    cases = {case.id for case in run.summary.cases}
+    return lambda case, renderer: case in cases and wanted(case, renderer)
+
+
 def names_of_cases(run: RunFolder, baselines: Baselines) -> dict[str, set[str]]:
     """By id: the names by which a case can be meant."""
     names: dict[str, set[str]] = {}

@@ -203,6 +203,16 @@ def test_what_was_approved_and_is_not_in_the_run_fails(work: Invoke) -> None:
     assert result.exit_code == 1
     assert f"missing {SLAB} student: the case is not in the run" in result.output
     assert work("check", "ball", "--run", "less").exit_code == 0
+    result = work("check", "--partial", "--run", "less")
+    assert result.exit_code == 0, result.output
+    assert "missing" not in result.output
+
+
+def test_a_part_of_a_run_must_have_its_renderers(work: Invoke) -> None:
+    work("run", "ball", "-r", "tracer", "--scenes", SCENES, "--out", "less")
+    result = work("check", "--partial", "--run", "less")
+    assert result.exit_code == 1
+    assert "missing" in result.output
 
 
 def test_a_renderer_that_is_gone_fails(work: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,10 @@ from harness.cli.errors import reports_errors
 )  # fmt: skip
 @click.option("--renderer", "-r", "renderers", multiple=True, metavar="NAME", help="Only these.")
 @click.option(
+    "--partial", is_flag=True,
+    help="Only the cases of the run: for a run of a part of what was approved.",
+)  # fmt: skip
+@click.option(
     "--history", type=click.Path(path_type=Path, file_okay=False, exists=True),
     help="Folder of earlier runs, to find slow drift.",
 )  # fmt: skip
@@ -29,6 +33,7 @@ def command(
     folder: Path,
     where: str | None,
     renderers: tuple[str, ...],
+    partial: bool,
     history: Path | None,
 ) -> None:
     """Compare a run with what was approved: all CASEs, or those a glob like "slab-*" selects.
@@ -39,7 +44,7 @@ def command(
     from harness.baseline.compare import compare
     from harness.baseline.outcome import outcome, write_outcome
     from harness.baseline.run_folder import read_run
-    from harness.baseline.select import selector
+    from harness.baseline.select import of_run, selector
     from harness.baseline.source import open_baselines
     from harness.baseline.trend import deviations, read_history, trends
     from harness.report import write_report
@@ -47,7 +52,7 @@ def command(
     run = read_run(folder)
     baselines = open_baselines(where or default_baseline())
     wanted = selector(case, renderers, run, baselines)
-    comparison = compare(run, baselines, wanted)
+    comparison = compare(run, baselines, of_run(run, wanted) if partial else wanted)
     earlier = read_history(history) if history else []
     runs = [*(s for s in earlier if s.started != run.summary.started), run.summary]
     found = outcome(comparison, baselines.source, trends(deviations(runs)))
