@@ -59,9 +59,7 @@ def connected(text: str) -> Iterator[Cluster]:
         import distributed
     except ModuleNotFoundError:
         raise InputError.of("a cluster needs Dask", key="--cluster", expected=INSTALL) from None
-    # What is lost is told once, by us; Dask's own threads would add a traceback for each of theirs.
-    for name in ("distributed", "tornado", "asyncio"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    _silence()
     with contextlib.ExitStack() as stack:
         address: Any = text
         if local is not None:
@@ -78,3 +76,14 @@ def connected(text: str) -> Iterator[Cluster]:
         except OSError as error:
             raise ConnectionLost(f"no scheduler answers at {text}: {error}") from error
         yield Cluster(client, text)
+
+
+def _silence() -> None:
+    """What is lost is told once, by us; Dask would add a traceback for each of its own tasks.
+
+    Its configuration gives levels to loggers far down, so each of them is set.
+    """
+    for package in ("distributed", "tornado", "asyncio"):
+        below = [name for name in logging.root.manager.loggerDict if name.startswith(f"{package}.")]
+        for name in (package, *below):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
