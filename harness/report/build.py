@@ -153,7 +153,7 @@ class _Report:
         images = [image for run in record.runs for image in run.images]
         named = [*record.files.values(), record.pack, *record.other_packs.values()]
         named += [d.path for d in record.differences]
-        named += [name for image in images for name in (image.path, image.picture)]
+        named += [name for image in images for name in (image.path, image.picture, image.thumbnail)]
         folder = RunFolder(self.folder)
         there = [folder.href(name) for name in named if name]
         neighbours = repr(self._neighbours(record.id))
