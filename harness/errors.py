@@ -10,6 +10,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+LONGEST_TEXT = 600
+
+
+def printable(text: str) -> str:
+    """The text with whatever could act on a terminal or break a line escaped."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
+
+
+def shown(text: str) -> str:
+    """The text as a message shows it; names in it may be of any length."""
+    text = printable(text)
+    return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
+
 
 class SnellcheckError(Exception):
     """Base of all errors that a user can cause or cure."""
@@ -35,13 +50,15 @@ class Problem:
         place = str(self.file) if self.file else "<input>"
         if self.line is not None:
             place += f":{self.line}"
-        text = f"{place}: {self.key}: {self.message}" if self.key else f"{place}: {self.message}"
+        text = f"{place}: {shown(self.key)}: " if self.key else f"{place}: "
+        text += self.message
+        # What is quoted here came from outside.
         if self.value is not None:
-            text += f"; got {self.value}"
+            text += f"; got {shown(self.value)}"
         if self.expected is not None:
-            text += f"; expected {self.expected}"
+            text += f"; expected {shown(self.expected)}"
         if self.suggestion is not None:
-            text += f"; did you mean {self.suggestion}?"
+            text += f"; did you mean {shown(self.suggestion)}?"
         return text
 
 

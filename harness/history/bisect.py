@@ -6,6 +6,7 @@ It works in a worktree of its own, so that the user's files, index and branch st
 from __future__ import annotations
 
 import contextlib
+import os
 import shlex
 import subprocess
 import tempfile
@@ -44,6 +45,8 @@ class Culprit:
     text: str
 
 
+ONLY_SKIPPED = 2  # git's exit code where no commit is left that can be tried
+
 Try = Callable[[Path], tuple[Answer, str]]
 
 
@@ -71,7 +74,7 @@ def bisect(
         while (found := _culprit(tree, said)) is None:
             step = _step(tree, "", attempt)
             report(step)
-            said = _git(tree, "bisect", str(step.answer), may_fail=True)
+            said = _git(tree, "bisect", str(step.answer), expected=ONLY_SKIPPED)
     return found
 
 
@@ -138,11 +141,15 @@ def _commit(root: Path, key: str, name: str) -> str:
     return found.splitlines()[-1]
 
 
-def _git(folder: Path, *arguments: str, may_fail: bool = False) -> str:
-    """What git prints. Raises InputError with what it says where it fails."""
+def _git(folder: Path, *arguments: str, expected: int = 0) -> str:
+    """What git prints, in English. Raises InputError with what it says where it fails.
+
+    The exit code `expected` is no failure.
+    """
     done = subprocess.run(
-        ["git", "-C", str(folder), *arguments], capture_output=True, text=True, check=False
-    )
-    if done.returncode != 0 and not may_fail:
+        ["git", "-C", str(folder), *arguments],
+        capture_output=True, text=True, check=False, env={**os.environ, "LC_ALL": "C"},
+    )  # fmt: skip
+    if done.returncode not in (0, expected):
         raise InputError.of(f"git {arguments[0]} failed: {done.stderr.strip()}", value=str(folder))
-    return (done.stdout + (done.stderr if may_fail else "")).strip()
+    return (done.stdout + done.stderr).strip() if done.returncode else done.stdout.strip()

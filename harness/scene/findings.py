@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from harness.errors import InputError, Problem
+from harness.errors import InputError, Problem, printable, shown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -24,7 +24,6 @@ Result = TypeVar("Result")
 
 LONGEST_VALUE = 80  # characters of a value that a message quotes
 LONGEST_KEY = 200
-LONGEST_TEXT = 600
 
 
 @dataclass(frozen=True)
@@ -91,19 +90,6 @@ def quoted(value: object) -> str:
         text = f"a {type(value).__name__}"
     text = printable(text)
     return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE - 1] + "…"
-
-
-def printable(text: str) -> str:
-    """The text with whatever could act on a terminal or break a line escaped."""
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
-
-
-def shown(text: str) -> str:
-    """The text as a message shows it; names in it may be of any length."""
-    text = printable(text)
-    return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
 
 
 def lines_of_keys(source: bytes) -> dict[KeyPath, int]:
@@ -189,8 +175,8 @@ def problems(findings: Iterable[Finding], file: Path, source: bytes | None) -> l
             line=_nearest_line(finding.path, lines),
             key=dotted(finding.path)[:LONGEST_KEY],
             value=finding.value,
-            expected=finding.expected and shown(finding.expected),
-            suggestion=finding.suggestion and shown(finding.suggestion),
+            expected=finding.expected,
+            suggestion=finding.suggestion,
         )
         for finding in findings
     ]

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import InputError
-from harness.scene import model, resolved
+from harness.scene import model, order, resolved
 from harness.scene.containment import Relation, bounds, relation, signed_distance
 from harness.scene.load import load_cases
 from harness.scene.mesh import closed_solid_problems, volume
@@ -598,6 +598,21 @@ def test_relations_of_spheres_follow_their_distance(a: float, b: float, apart: f
 def test_overlaps_name_both_solids() -> None:
     document = scene(sphere(1), sphere(1, 9), sphere(1, 1))
     assert problems_of(document) == [("solids[2].shape", "overlaps solid s0 partly")]
+
+
+def test_a_scene_full_of_overlaps_is_told_of_some() -> None:
+    found = problems_of(scene(*(sphere(1, 0.01 * k) for k in range(60))))
+    assert len(found) == order.MOST_FINDINGS
+    assert all("overlaps solid" in message for _, message in found)
+
+
+def test_too_many_near_solids_are_refused_before_any_is_compared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(order, "relation", None)
+    ((key, message),) = problems_of(scene(*(sphere(1, 1e-3 * k) for k in range(200))))
+    assert key == "solids"
+    assert message.startswith(f"more than {order.MOST_PAIRS} pairs of solids overlap")
 
 
 @settings(max_examples=40, deadline=None)
