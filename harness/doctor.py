@@ -23,6 +23,7 @@ from harness.cores import core_count
 from harness.data import cache_root, scenes_root
 from harness.errors import SnellcheckError
 from harness.renderers.base import Health, Renderer
+from harness.renderers.confinement import described
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -91,7 +92,7 @@ def diagnose(factories: Mapping[str, Factory] | None = None) -> Diagnosis:
         memory_mb=memory.total // 2**20,
         memory_available_mb=memory.available // 2**20,
         cache=str(cache_root()),
-        findings=(_python(), _cache(cache_root()), _scenes(scenes_root())),
+        findings=(_python(), _cache(cache_root()), _scenes(scenes_root()), _confinement()),
         renderers=renderers,
     )
 
@@ -147,6 +148,11 @@ def _scenes(folder: Path) -> Finding:
         if count
         else f"{shlex.quote(sys.executable)} -m pip install --force-reinstall --no-deps snellcheck",
     )
+
+
+def _confinement() -> Finding:
+    """What renderers are held to. Where the system cannot, nothing is broken: it is only told."""
+    return Finding(name="confinement", ok=True, detail=described())
 
 
 # --- for people ---------------------------------------------------------------------------------

@@ -310,6 +310,7 @@ class Summary(Model):
     baseline: BaselineSummary | None = None
     diagnoses: list[Diagnosis] = Field(default_factory=list)  # one per renderer that is off
     effort: Effort = Effort()
+    confinement: str = ""  # what the system held renderers to
     interrupted: bool = False  # then cases that were not judged yet are ERROR and have no record
 
     model_config = ConfigDict(

@@ -19,7 +19,9 @@ from harness.judging.results import Contender
 from harness.plan import PreparedCase
 from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdict
 from harness.renderers.base import Renderer, RenderSettings
+from harness.renderers.confinement import described
 from harness.running import lanes
+from harness.running.remote import RemoteRenderer
 from harness.running.session import Progress, Session, Storage
 from harness.running.shard import write_times
 
@@ -125,6 +127,8 @@ def _summary(
     caches = {id(c): c for c in (session.storage.lasting, session.storage.passing) if c}
     damaged = sum(cache.damaged for cache in caches.values())
     retried = sum(getattr(lane.renderer, "retried", 0) for lane in session.lanes.values())
+    retried += session.running.retried
+    elsewhere = all(isinstance(lane.renderer, RemoteRenderer) for lane in session.lanes.values())
     return Summary(
         snellcheck_version=__version__,
         started=session.started,
@@ -139,6 +143,7 @@ def _summary(
             [state.case for state in session.states], cases, {c.name: c.reason for c in contenders}
         ),
         effort=session.effort.model_copy(update={"damaged": damaged, "retried": retried}),
+        confinement="as on the cluster's machines" if elsewhere else described(),
         interrupted=interrupted,
     )
 

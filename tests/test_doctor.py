@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from harness import doctor
+from harness.renderers import confinement
 from harness.renderers.base import Health
 
 WELL = Health(
@@ -88,6 +89,17 @@ def test_json_holds_all_that_is_shown() -> None:
     assert document["renderers"][1]["remedy"] == ILL.remedy
     assert document["cores"] >= 1
     assert document["memory_mb"] > document["memory_available_mb"] > 0
+
+
+def test_what_renderers_are_held_to_is_told_and_nothing_to_mend(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(confinement, "_holds", lambda: (0, False))
+    diagnosis = diagnose(WELL)
+    assert diagnosis.healthy
+    found = {f["name"]: f["detail"] for f in json.loads(diagnosis.to_json())["findings"]}
+    assert found["confinement"] == confinement.described()
+    assert found["confinement"].startswith("none: ")
 
 
 def test_a_cache_folder_that_cannot_be_made_is_found_by_writing(

@@ -18,6 +18,7 @@ from typing import IO, Any
 from pydantic import ValidationError
 
 from harness.errors import RendererError, RendererFailed, RendererMissing, RendererUnsupported
+from harness.renderers.confinement import Confinement
 from harness.renderers.limits import OUTPUT_MB, POLL_S, Watch
 from harness.renderers.process import describe_signal, tail
 from harness.renderers.process_tree import ProcessTree, spawn
@@ -34,11 +35,17 @@ _ERRORS: dict[str, type[RendererError]] = {
 class Child:
     """`argv`, run in `folder` (or in a private temporary one) until `close` or its own end.
 
-    Not for use by several threads at a time.
+    `confinement` says what it may touch beside its private folder. Not for use by several threads
+    at a time.
     """
 
     def __init__(
-        self, name: str, argv: Sequence[str], folder: Path | None, env: Mapping[str, str]
+        self,
+        name: str,
+        argv: Sequence[str],
+        folder: Path | None,
+        env: Mapping[str, str],
+        confinement: Confinement,
     ) -> None:
         self._name = name
         self._private = Path(tempfile.mkdtemp(prefix="snellcheck-"))
@@ -47,11 +54,12 @@ class Child:
             self._tree = spawn(
                 argv,
                 cwd=folder or self._private,
-                env=env,
+                env={**env, "TMPDIR": str(self._private)},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=self._log,
                 output_mb=OUTPUT_MB,
+                confinement=confinement.and_writable(self._private),
             )
         except BaseException:
             self._log.close()

@@ -19,6 +19,7 @@ from harness.errors import InputError, RendererError, RendererFailed, RendererMi
 from harness.fingerprint import code_digest, combined, file_digest
 from harness.imagefile import Encoding
 from harness.renderers.base import Capability, Health, Image, RenderSettings
+from harness.renderers.confinement import PRIVATE_ALONE, Confinement
 from harness.renderers.delivery import delivered, described
 from harness.renderers.needs import require
 from harness.renderers.process import run_limited, tail
@@ -106,7 +107,8 @@ class CommandRenderer:
     `encoding` is what integer values in an image mean, where the file itself does not say.
     Without a declared `version` it is the hash of the files that the command names, so that a
     changed program is another version. `depends` are globs of all files that decide its images;
-    only where they are given are images kept from run to run.
+    only where they are given are images kept from run to run. `confinement` says what it may touch
+    beside that temporary folder.
     """
 
     # A small renderer uses one core.
@@ -123,8 +125,10 @@ class CommandRenderer:
         capabilities: frozenset[Capability] = USUAL_CLAIMS,
         version: str = "",
         depends: tuple[str, ...] = (),
+        confinement: Confinement = PRIVATE_ALONE,
     ) -> None:
         self._depends = depends
+        self._confinement = confinement
         self._name = name
         self._template = template
         self._folder = folder
@@ -153,7 +157,10 @@ class CommandRenderer:
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """Raises RendererMissing, RendererUnsupported or RendererFailed."""
         require(scene, self.name, self.capabilities)
-        with tempfile.TemporaryDirectory(prefix="snellcheck-") as private:
+        with (
+            self._confinement.explained(),
+            tempfile.TemporaryDirectory(prefix="snellcheck-") as private,
+        ):
             output = Path(private) / f"image.{self._image_format}"
             scene_file = self.emit(scene, Path(private))
             values = {
@@ -171,6 +178,7 @@ class CommandRenderer:
                 timeout_s=settings.timeout_s,
                 memory_mb=settings.memory_mb,
                 private=Path(private),
+                confinement=self._confinement,
                 env={**os.environ, "TMPDIR": private},
             )
             log = tail(done.stderr.strip() or done.stdout)

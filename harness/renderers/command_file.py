@@ -18,6 +18,7 @@ from harness.renderers.command import (
     Template,
     command_fingerprint,
 )
+from harness.renderers.confinement import Confinement
 from harness.renderers.persistent import Program, WorkerRenderer
 from harness.scene.document import parse_document, read_source
 from harness.scene.findings import Finding, input_error, quoted
@@ -29,7 +30,8 @@ class RendererTable(BaseModel):
     """The [renderer] table.
 
     With `persistent` the program stays alive and speaks the worker protocol; otherwise it is run
-    once for each image. Either way it is run in the folder of the file.
+    once for each image. Either way it is run in the folder of the file, from which `writable` paths
+    count, too: what it may write to beside the folder of its image.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -42,6 +44,8 @@ class RendererTable(BaseModel):
     persistent: bool = False
     version: str = ""
     depends: list[str] = []
+    writable: list[str] = []
+    network: bool = False
 
 
 def renderer_from_file(path: Path) -> Renderer:
@@ -85,6 +89,7 @@ def renderer_from_command(text: str, folder: Path) -> Renderer:
 
 def _renderer(table: RendererTable, folder: Path) -> Renderer:
     claims = None if table.capabilities is None else frozenset(table.capabilities)
+    confinement = Confinement(_paths(table.writable, folder), network=table.network)
     if not table.persistent:
         return CommandRenderer(
             table.name,
@@ -95,13 +100,25 @@ def _renderer(table: RendererTable, folder: Path) -> Renderer:
             capabilities=USUAL_CLAIMS if claims is None else claims,
             version=table.version,
             depends=tuple(table.depends),
+            confinement=confinement,
         )
     template = Template.parse(table.command, needs=(), known=("python",))
-    program = Program(tuple(template.fill({})), folder, table.format, table.encoding)
+    argv = tuple(template.fill({}))
+    program = Program(argv, folder, table.format, table.encoding, confinement=confinement)
     return WorkerRenderer(
         table.name, program, capabilities=claims,
         fingerprint=lambda: command_fingerprint(list(program.argv), folder, table.depends),
     )  # fmt: skip
+
+
+def _paths(texts: list[str], folder: Path) -> tuple[Path, ...]:
+    """The files and folders named, seen from `folder`. Raises InputError where one is not there."""
+    paths = [folder / Path(text).expanduser() for text in texts]
+    for text, path in zip(texts, paths, strict=True):
+        if not path.exists():
+            expected = f"a file or folder, seen from {folder}"
+            raise InputError.of("is not there", key="writable", value=text, expected=expected)
+    return tuple(paths)
 
 
 def _finding(details: Any) -> Finding:

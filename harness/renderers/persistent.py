@@ -6,13 +6,15 @@ request, does one at a time, and is replaced when it dies, hangs or takes too mu
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
+import shutil
 import sys
 import tempfile
 import threading
 import weakref
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,7 @@ from harness.imagefile import Encoding
 from harness.renderers import wire
 from harness.renderers.base import Capability, Health, Image, RayPaths, Rays, RenderSettings
 from harness.renderers.child import Child
+from harness.renderers.confinement import PRIVATE_ALONE, Confinement
 from harness.renderers.delivery import delivered, described
 from harness.renderers.needs import require
 from harness.renderers.proof import proof_scene, prove
@@ -36,7 +39,8 @@ class Program:
     """What speaks the protocol: `argv`, run in `folder` (None: a private temporary one).
 
     It is asked to write images in `image_format`; `encoding` is what integer values in them mean.
-    `env` is added to the environment.
+    `env` is added to the environment. `confinement` says what it may touch beside the folders of
+    its requests.
     """
 
     argv: tuple[str, ...]
@@ -44,13 +48,20 @@ class Program:
     image_format: str = "npy"
     encoding: Encoding | None = None
     env: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    confinement: Confinement = PRIVATE_ALONE
 
 
-def engine_program(engine: str) -> Program:
-    """Serves `engine`, "module:Class", with our own worker, in our Python, from our places."""
+def engine_program(engine: str, *caches: Path) -> Program:
+    """Serves `engine`, "module:Class", with our own worker, in our Python, from our places.
+
+    `caches` are the folders where it keeps what it has compiled.
+    """
     argv = (sys.executable, "-P", "-m", "harness.renderers.worker", engine)
     places = os.pathsep.join(entry or str(Path.cwd()) for entry in sys.path)
-    return Program(argv, env={"PYTHONPATH": places})
+    harness = Path(__file__).parents[1]
+    compiled = (harness / stage / "__pycache__" for stage in ("renderers", "translate", "truth"))
+    confinement = Confinement(writable=(*compiled, *caches))
+    return Program(argv, env={"PYTHONPATH": places}, confinement=confinement)
 
 
 class WorkerRenderer:
@@ -84,6 +95,8 @@ class WorkerRenderer:
         self._remedy = remedy
         self._hello: wire.Reply | None = None
         self._child: Child | None = None
+        self._room: Path | None = None
+        self._remove_room: weakref.finalize[..., WorkerRenderer] | None = None
         self._lock = threading.RLock()
         _RENDERERS.add(self)
 
@@ -105,8 +118,7 @@ class WorkerRenderer:
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """Raises RendererMissing, RendererUnsupported or RendererFailed."""
         require(scene, self.name, self._claimed())
-        with tempfile.TemporaryDirectory(prefix="snellcheck-") as name:
-            folder = Path(name)
+        with self._request() as folder:
             output = folder / f"image.{self._program.image_format}"
             reply = self._ask("render", settings, scene=_write(scene, folder), output=output)
             encoding = self._program.encoding
@@ -128,8 +140,7 @@ class WorkerRenderer:
         require(scene, self.name, self._claimed())
         if "trace" not in self._greeting().operations:
             raise RendererUnsupported(f"{self.name} has no ray API")
-        with tempfile.TemporaryDirectory(prefix="snellcheck-") as name:
-            folder = Path(name)
+        with self._request() as folder:
             given, output = folder / "rays.npy", folder / "paths.npy"
             wire.write_rays(given, rays)
             scene_file = _write(scene, folder)
@@ -143,15 +154,18 @@ class WorkerRenderer:
 
     def emit(self, scene: ResolvedScene, folder: Path) -> Path:
         """What the engine makes of the scene where it can show it, or else scene.json."""
-        folder = folder.resolve()  # the worker's working folder is another
         folder.mkdir(parents=True, exist_ok=True)
-        scene_file = _write(scene, folder)
-        if "emit" not in self._greeting().operations:
-            return scene_file
-        reply = self._ask("emit", RenderSettings(), scene=scene_file, folder=folder)
-        if reply.file != scene_file:
-            scene_file.unlink()
-        return reply.file or scene_file
+        with self._request() as private:
+            main = scene_file = _write(scene, private)
+            if "emit" in self._greeting().operations:
+                reply = self._ask("emit", RenderSettings(), scene=scene_file, folder=private)
+                if reply.file is not None and reply.file != scene_file:
+                    main = reply.file
+                    scene_file.unlink()
+            if not main.is_relative_to(private):
+                raise RendererFailed(f"{self.name} says that it wrote to {main}")
+            shutil.copytree(private, folder, symlinks=True, dirs_exist_ok=True)
+            return folder / main.relative_to(private)
 
     def health(self) -> Health:
         """Probes with a tiny render in a worker of its own. Never raises."""
@@ -187,9 +201,32 @@ class WorkerRenderer:
     def close(self) -> None:
         """Ends the worker. A later request starts another."""
         with self._lock:
-            if self._child is not None:
-                self._child.close()
-            self._child = None
+            self._end_child()
+            if self._remove_room is not None:
+                self._remove_room()
+            self._room = None
+
+    def _end_child(self) -> None:
+        if self._child is not None:
+            self._child.close()
+        self._child = None
+
+    @contextlib.contextmanager
+    def _request(self) -> Iterator[Path]:
+        """A folder for the files of one request, in the room that the worker may write to."""
+        with (
+            self._program.confinement.explained(),
+            tempfile.TemporaryDirectory(prefix="request-", dir=self._private()) as name,
+        ):
+            yield Path(name)
+
+    def _private(self) -> Path:
+        """The room, which outlives a worker that has to be replaced."""
+        with self._lock:
+            if self._room is None:
+                self._room = Path(tempfile.mkdtemp(prefix="snellcheck-")).resolve()
+                self._remove_room = weakref.finalize(self, shutil.rmtree, self._room, True)
+            return self._room
 
     def _claimed(self) -> frozenset[Capability]:
         return self._greeting().capabilities if self._declared is None else self._declared
@@ -216,10 +253,11 @@ class WorkerRenderer:
         """The living worker, after it has said hello."""
         if self._child is not None and self._child.usable():
             return self._child
-        self.close()
-        child = None
+        self._end_child()
+        child, program = None, self._program
+        confinement = program.confinement.and_writable(self._private())
         try:
-            child = Child(self.name, self._program.argv, self._program.folder, self._environment())
+            child = Child(self.name, program.argv, program.folder, self._environment(), confinement)
             hello = {"op": "hello", "protocol": wire.PROTOCOL}
             greeting = child.ask(hello, START_S, RenderSettings().memory_mb)
             if greeting.protocol != wire.PROTOCOL:
@@ -244,7 +282,9 @@ class WorkerRenderer:
         self._lock = threading.RLock()
         if self._child is not None:
             self._child.abandon()
-        self._child = None
+        if self._remove_room is not None:
+            self._remove_room.detach()
+        self._child, self._room, self._remove_room = None, None, None
 
 
 def _write(scene: ResolvedScene, folder: Path) -> Path:

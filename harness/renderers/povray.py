@@ -25,6 +25,7 @@ from harness.errors import (
 )
 from harness.fingerprint import code_digest, combined, file_digest, versions
 from harness.renderers.base import Capability, Health, Image, RenderSettings
+from harness.renderers.confinement import Confinement
 from harness.renderers.delivery import delivered
 from harness.renderers.needs import require
 from harness.renderers.process import Finished, run_limited
@@ -40,7 +41,8 @@ OLDEST = (3, 7)
 GOODBYE = "POV-Ray finished"
 
 # POV-Ray's own confinement. It was seen not to hold, so it is not what safety rests on: that is
-# `translate.povray`, which lets numbers alone into the scene. Without this file POV-Ray complains.
+# `translate.povray`, which lets numbers alone into the scene, and the system's confinement below.
+# Without this file POV-Ray complains.
 CONFIGURATION = """\
 [File I/O Security]
 restricted
@@ -49,6 +51,18 @@ forbidden
 [Permitted Paths]
 read+write = .
 """
+
+# What it may read beside the scene: itself, its libraries, and what the C library looks into.
+SYSTEM = tuple(
+    Path(name)
+    for name in (
+        "/usr", "/lib", "/lib32", "/lib64", "/bin", "/opt", "/nix/store", "/gnu/store",
+        "/etc/ld.so.cache", "/etc/ld.so.preload", "/etc/ld.so.conf", "/etc/ld.so.conf.d",
+        "/etc/alternatives", "/etc/povray", "/etc/localtime", "/etc/nsswitch.conf", "/etc/passwd",
+        "/sys/devices/system/cpu", "/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat",
+        "/dev/urandom", "/dev/random",
+    )
+)  # fmt: skip
 
 
 class PovRayRenderer:
@@ -187,14 +201,22 @@ def _run(argv: list[str], folder: Path, settings: RenderSettings) -> Finished:
         configuration.write_text(CONFIGURATION, encoding="ascii")
     ini = home / "povray.ini"
     ini.touch()
-    env = {**os.environ, "HOME": str(home), "POVINI": str(ini)}
-    timeout_s, memory_mb = settings.timeout_s, settings.memory_mb
+    env = {**os.environ, "HOME": str(home), "POVINI": str(ini), "TMPDIR": str(folder)}
     try:
         return run_limited(
-            argv, cwd=folder, timeout_s=timeout_s, memory_mb=memory_mb, private=folder, env=env
-        )
+            argv, cwd=folder, timeout_s=settings.timeout_s, memory_mb=settings.memory_mb,
+            private=folder, confinement=confinement(argv[0]), env=env,
+        )  # fmt: skip
     except RendererFailed as error:
         raise RendererFailed(str(error), log=messages(error.log)) from None
+
+
+def confinement(executable: str) -> Confinement:
+    """POV-Ray reads what belongs to the system and to itself, and writes beside its scene alone."""
+    places = [Path(executable).resolve().parents[1], Path(executable).parent]
+    loaded = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
+    places += [Path(place) for place in loaded if place]
+    return Confinement(readable=(*SYSTEM, *places), shares=False)
 
 
 def messages(stderr: str) -> str:

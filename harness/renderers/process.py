@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import RendererFailed
+from harness.renderers.confinement import Confinement
 from harness.renderers.limits import LOG_MB, OUTPUT_MB, POLL_S, Watch
 from harness.renderers.process_tree import ProcessTree, spawn
 
@@ -41,6 +42,7 @@ def run_limited(
     memory_mb: int,
     output_mb: int = OUTPUT_MB,
     private: Path | None = None,
+    confinement: Confinement | None = None,
     stdin: bytes | None = None,
     env: Mapping[str, str] | None = None,
 ) -> Finished:
@@ -54,6 +56,7 @@ def run_limited(
     * `output_mb` for each file that it writes (Linux) and for all files in `private` together,
       and 64 MB for its stdout and stderr.
     * 256 processes.
+    * What `confinement` says that it may touch beside `private`; None is whatever we may.
 
     `env` replaces the environment. Raises RendererMissing where the program cannot be found,
     RendererFailed, with the tail of its log, where a limit or a signal ended it.
@@ -61,6 +64,8 @@ def run_limited(
     started = time.monotonic()
     cpu_s = timeout_s * (os.cpu_count() or 1)
     source = subprocess.DEVNULL if stdin is None else subprocess.PIPE
+    if confinement is not None and private is not None:
+        confinement = confinement.and_writable(private)
     tree = spawn(
         argv,
         cwd=cwd,
@@ -69,6 +74,7 @@ def run_limited(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         output_mb=output_mb,
+        confinement=confinement,
         cpu_s=cpu_s,
     )
     streams = _Streams(tree.process, stdin or b"", min(output_mb, LOG_MB) * 2**20)

@@ -9,6 +9,7 @@ leaves the session *and* empties its environment is not; no portable means finds
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import signal
@@ -17,7 +18,7 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextvars import ContextVar
 from pathlib import Path
 from typing import IO
@@ -25,16 +26,26 @@ from typing import IO
 import psutil
 
 from harness.errors import RendererFailed, RendererMissing
+from harness.renderers.confinement import Confinement, start
 
 TOKEN = "SNELLCHECK_PROCESS"
 
 Pipe = int | IO[bytes]
 
+# Why a program could not be started for no fault of its own: no room for a process or its pipes
+# just now, or somebody is still writing the file. That passes.
+PASSING = frozenset({errno.EAGAIN, errno.ENOMEM, errno.ETXTBSY, errno.EMFILE, errno.ENFILE})
+PAUSES_S = (0.1, 0.4, 1.6)  # before it is tried again
+
 
 class Running:
-    """What a run has started. `stop` ends it all, from any thread, and lets nothing begin."""
+    """What a run has started. `stop` ends it all, from any thread, and lets nothing begin.
+
+    `retried` counts how often something had to be started again, since there was no room for it.
+    """
 
     def __init__(self) -> None:
+        self.retried = 0
         self._lock = threading.Lock()
         self._trees: weakref.WeakSet[ProcessTree] = weakref.WeakSet()
         self._stopped = False
@@ -48,6 +59,10 @@ class Running:
             tree.kill()
             tree.process.wait()
             raise RendererFailed("the run was stopped")
+
+    def count_retry(self) -> None:
+        with self._lock:
+            self.retried += 1
 
     def stop(self) -> None:
         with self._lock:
@@ -144,6 +159,7 @@ def spawn(
     stdout: Pipe,
     stderr: Pipe,
     output_mb: int,
+    confinement: Confinement | None = None,
     cpu_s: float | None = None,
 ) -> ProcessTree:
     """Starts `argv` (no shell) as the leader of its own session, with limits on Linux.
@@ -152,14 +168,16 @@ def spawn(
     of processor time, which also ends it should we be killed and unable to. The limits are set
     on the running process, since code between fork and exec is not safe beside threads. macOS
     cannot do that and goes without them; time and memory are watched there all the same.
+    `confinement` says what it may touch, None that it may whatever we may.
 
-    Raises RendererMissing where `argv[0]` cannot be found or is no program, RendererFailed where
-    it cannot be started.
+    Where there is no room for a process it is tried again, a few times. Raises RendererMissing
+    where `argv[0]` cannot be found or is no program, RendererFailed where it cannot be started.
     """
     token = secrets.token_hex(8)
     before = set(psutil.pids())
-    try:
-        process = subprocess.Popen(
+
+    def begin() -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
             list(argv),
             cwd=cwd,
             env={**(os.environ if env is None else env), TOKEN: token},
@@ -168,6 +186,9 @@ def spawn(
             stderr=stderr,
             start_new_session=True,
         )
+
+    try:
+        process = _patiently(begin if confinement is None else lambda: start(confinement, begin))
     except (FileNotFoundError, PermissionError, NotADirectoryError) as error:
         if not cwd.is_dir():
             raise RendererFailed(f"cannot be started: no folder {cwd}") from error
@@ -179,6 +200,20 @@ def spawn(
     if (running := _RUNNING.get()) is not None:
         running.add(tree)
     return tree
+
+
+def _patiently(begin: Callable[[], subprocess.Popen[bytes]]) -> subprocess.Popen[bytes]:
+    """What `begin` starts, after some more attempts where what is in its way will pass."""
+    for pause_s in PAUSES_S:
+        try:
+            return begin()
+        except OSError as error:
+            if error.errno not in PASSING:
+                raise
+        if (running := _RUNNING.get()) is not None:
+            running.count_retry()
+        time.sleep(pause_s)
+    return begin()
 
 
 def _limit(pid: int, output_mb: int, cpu_s: float | None) -> None:

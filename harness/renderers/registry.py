@@ -8,8 +8,10 @@ renderer is asked for, and Mitsuba and the tracer never are in this process.
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
 from harness.errors import InputError, RendererFailed, RendererMissing, nearest
@@ -95,11 +97,23 @@ def _origin(entry: EntryPoint) -> str:
 
 def tracer() -> Renderer:
     """The tracer of this project, in a worker."""
-    from harness.renderers.persistent import WorkerRenderer
+    from harness.renderers.persistent import WorkerRenderer, engine_program
 
-    return WorkerRenderer(
-        "tracer", "harness.renderers.tracer:TracerEngine", fingerprint=_fingerprint_of_tracer
-    )
+    program = engine_program("harness.renderers.tracer:TracerEngine", *_caches_of_numba())
+    return WorkerRenderer("tracer", program, fingerprint=_fingerprint_of_tracer)
+
+
+def _caches_of_numba() -> tuple[Path, ...]:
+    """Where Numba keeps the tracer as machine code: beside it, or in the user's cache."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return (Path(chosen),)
+    import platformdirs
+
+    found = find_spec("tracer")
+    beside = [
+        Path(place, "__pycache__") for place in (found and found.submodule_search_locations) or ()
+    ]
+    return (*beside, platformdirs.user_cache_path("numba"))
 
 
 def _fingerprint_of_tracer() -> str:
@@ -133,11 +147,12 @@ def mitsuba_exact() -> Renderer:
 
 def _mitsuba(name: str, engine: str) -> Renderer:
     from harness.renderers.mitsuba_variants import child_environment
-    from harness.renderers.persistent import WorkerRenderer
+    from harness.renderers.persistent import WorkerRenderer, engine_program
 
-    target = f"harness.renderers.mitsuba:{engine}"
+    # Dr.Jit keeps what it has compiled in the user's home.
+    program = engine_program(f"harness.renderers.mitsuba:{engine}", Path.home() / ".drjit")
     return WorkerRenderer(
-        name, target, env=child_environment, remedy=INSTALL_MITSUBA,
+        name, program, env=child_environment, remedy=INSTALL_MITSUBA,
         fingerprint=_fingerprint_of_mitsuba,
     )  # fmt: skip
 

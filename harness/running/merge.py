@@ -149,6 +149,7 @@ def _merged(
                 mine, judged, {name: r.reason for name, r in first.renderers.items()}
             ),
             "effort": Effort(**{key: sum(e[key] for e in efforts) for key in efforts[0]}),
+            "confinement": "; ".join(sorted({part.summary.confinement for part in parts})),
         }
     )
 

@@ -38,8 +38,12 @@ def act(folder: Path, **inputs: str) -> subprocess.CompletedProcess[str]:
         name: INPUT.sub(lambda match: values[match[1]], text)
         for name, text in script["env"].items()
     }
+    installed = folder.parent / "snellcheck" / "bin" / "snellcheck"
+    if not installed.exists():
+        installed.parent.mkdir(parents=True)
+        installed.symlink_to(Path(sys.executable).with_name("snellcheck"))
     environment |= {
-        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "RUNNER_TEMP": str(folder.parent),
         "GITHUB_STEP_SUMMARY": str(folder / "summary.md"),
         "SNELLCHECK_CACHE": str(folder.parent / "cache"),
     }  # fmt: skip

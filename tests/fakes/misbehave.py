@@ -11,6 +11,7 @@ import json
 import os
 import pickle
 import signal
+import socket
 import struct
 import sys
 import time
@@ -111,6 +112,22 @@ def flood_file(output: Path, width: int, height: int) -> None:
             file.write(bytes(1 << 20))
 
 
+def write_outside(output: Path, width: int, height: int) -> None:
+    Path(os.environ["MISBEHAVE_OUTSIDE"]).write_text("out")
+    good(output, width, height)
+
+
+def connect(output: Path, width: int, height: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to_anywhere:
+        to_anywhere.sendto(b"a secret", ("127.0.0.1", 9))
+    good(output, width, height)
+
+
+def signal_parent(output: Path, width: int, height: int) -> None:
+    os.kill(os.getppid(), signal.SIGCONT)  # which does no harm; SIGKILL would
+    good(output, width, height)
+
+
 def truncated(output: Path, width: int, height: int) -> None:
     output.write_bytes(image(width, height)[:-100])
 
@@ -165,6 +182,9 @@ MODES: dict[str, Callable[[Path, int, int], None]] = {
         many_files,
         flood,
         flood_file,
+        write_outside,
+        connect,
+        signal_parent,
         truncated,
         huge,
         wrong_size,

@@ -22,6 +22,7 @@ from harness.renderers.base import (
     RenderSettings,
     Status,
 )
+from harness.renderers.confinement import described
 from harness.renderers.registry import create
 from harness.report import write_report
 from harness.report.links import page_name
@@ -99,6 +100,7 @@ def test_the_summary_holds_what_scripts_rely_on(tmp_path: Path) -> None:
     assert data["wall_s"] > 0
     assert data["started"].endswith("+00:00")
     assert data["snellcheck_version"]
+    assert data["confinement"] == described()
     assert data["exit_code"] == 0
     renderer = data["renderers"]["student"]
     assert (renderer["version"], renderer["status"], renderer["cases"]) == ("1.0", "ok", 2)

@@ -15,6 +15,7 @@ from harness.errors import InputError, RendererFailed, RendererMissing, Renderer
 from harness.renderers.base import Capability, Renderer, RenderSettings
 from harness.renderers.command import USUAL_CLAIMS, CommandRenderer, Template
 from harness.renderers.command_file import renderer_from_command, renderer_from_file
+from harness.renderers.confinement import Confinement
 from harness.renderers.persistent import WorkerRenderer
 from harness.renderers.proof import proof_scene
 from tests.fakes import MISBEHAVE
@@ -108,7 +109,10 @@ def test_what_a_command_is_given(tmp_path: Path) -> None:
     template = Template.parse(
         "{python} rec.py {scene} {output} {width} {height} {samples} {seed} {threads}"
     )
-    renderer = CommandRenderer("rec", template, tmp_path, image_format="ppm")
+    opened = Confinement(writable=(tmp_path,))
+    renderer = CommandRenderer(
+        "rec", template, tmp_path, image_format="ppm", confinement=opened
+    )  # fmt: skip
     image = renderer.render(SCENE, RenderSettings(samples=3, seed=5, threads=1))
     seen = json.loads((tmp_path / "seen.json").read_text())
     assert seen["argv"][2:] == ["8", "8", "3", "5", "1"]

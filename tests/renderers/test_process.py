@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import json
+import os
+import subprocess
 import sys
 import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
+from rich.console import Console
 
+from harness import show
 from harness.errors import RendererFailed, RendererMissing
+from harness.renderers.command import CommandRenderer, Template
+from harness.renderers.confinement import Confinement
 from harness.renderers.process import Finished, run_limited, tail
+from harness.renderers.process_tree import Running, belong_to
+from tests.harness.tiny import run_tiny
 
 MISBEHAVE = Path(__file__).parents[1] / "fakes" / "misbehave.py"
 
@@ -69,6 +82,74 @@ def test_a_file_that_is_no_program(tmp_path: Path) -> None:
     (tmp_path / "data").chmod(0o755)
     with pytest.raises(RendererFailed, match=r"cannot start '\./data'"):
         run_limited(["./data"], cwd=tmp_path, timeout_s=20, memory_mb=512)
+
+
+@pytest.fixture
+def crowded(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[int]]:
+    """Makes the next attempts to start something fail with these numbers; returns those left."""
+    started = subprocess.Popen
+
+    def crowd(*numbers: int) -> list[int]:
+        left = list(numbers)
+
+        def start(*arguments: Any, **more: Any) -> Any:
+            if left:
+                raise OSError(left[0], os.strerror(left.pop(0)))
+            return started(*arguments, **more)
+
+        monkeypatch.setattr("harness.renderers.process_tree.subprocess.Popen", start)
+        return left
+
+    monkeypatch.setattr("harness.renderers.process_tree.PAUSES_S", (0.001, 0.001, 0.001))
+    return crowd
+
+
+@pytest.mark.parametrize("confined", [None, Confinement()])
+def test_no_room_for_a_process_is_tried_again_and_counted(
+    confined: Confinement | None, crowded: Callable[..., list[int]], tmp_path: Path
+) -> None:
+    running = Running()
+    crowded(errno.EAGAIN, errno.ENOMEM, errno.ETXTBSY)
+
+    def attempt() -> Finished:
+        belong_to(running)
+        argv = [sys.executable, "-c", "print('well')"]
+        return run_limited(argv, cwd=tmp_path, timeout_s=20, memory_mb=512, confinement=confined)
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(attempt).result().stdout == "well\n"
+    assert running.retried == 3
+
+
+def test_what_was_tried_again_is_told_at_the_end_of_a_run(
+    crowded: Callable[..., list[int]], tmp_path: Path
+) -> None:
+    template = Template((sys.executable, str(MISBEHAVE), "good", "{scene}", "{output}"))
+    outside = CommandRenderer("odd", template, tmp_path, image_format="npy")
+    crowded(errno.EAGAIN, errno.EAGAIN)
+    summary = run_tiny(tmp_path, outside, cases=["snell"])
+    assert summary.effort.retried == 2
+    console = Console(file=io.StringIO(), width=200)
+    show._effort(summary, console)
+    assert ", 2 tried again\n" in console.file.getvalue()  # type: ignore[attr-defined]
+
+
+def test_what_does_not_pass_ends_as_an_error(
+    crowded: Callable[..., list[int]], tmp_path: Path
+) -> None:
+    left = crowded(*[errno.EAGAIN] * 5)
+    with pytest.raises(RendererFailed, match=r"cannot start.*temporarily unavailable"):
+        python("", tmp_path)
+    assert len(left) == 1  # four attempts
+
+
+def test_a_fault_of_the_program_is_not_tried_again(
+    crowded: Callable[..., list[int]], tmp_path: Path
+) -> None:
+    left = crowded(errno.ENOEXEC, errno.ENOEXEC)
+    with pytest.raises(RendererFailed, match="Exec format error"):
+        python("", tmp_path)
+    assert len(left) == 1
 
 
 def test_missing_folder_is_not_a_missing_program(tmp_path: Path) -> None:

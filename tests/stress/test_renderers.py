@@ -11,6 +11,7 @@ import pytest
 
 from harness.errors import RendererFailed
 from harness.record import Check, Verdict
+from harness.renderers import landlock, seccomp
 from harness.renderers.base import Image, Renderer, RenderSettings
 from harness.renderers.command import CommandRenderer, Template
 from harness.renderers.persistent import Program, WorkerRenderer
@@ -43,6 +44,13 @@ ONE_SHOT = {
     "text": "not an image",
     "none": "wrote no image",
 }
+# What only some systems can refuse, and what it takes.
+REFUSED = {
+    "write-outside": landlock.version() > 0,
+    "connect": seccomp.available(),
+    "signal-parent": landlock.version() >= landlock.SINCE_SCOPES,
+}
+ONE_SHOT |= dict.fromkeys(REFUSED, "writes to its private folder alone and uses no network")
 PERSISTENT = {
     "crash": "ended with exit code 3",
     "abort": "SIGABRT",
@@ -63,6 +71,7 @@ PERSISTENT = {
     "babble": "answered 'Rendering, 10%",
     "other-id": "answered request",
 }
+PERSISTENT |= dict.fromkeys(REFUSED, "writes to its private folder alone and uses no network")
 
 
 def one_shot(mode: str) -> Renderer:
@@ -106,8 +115,11 @@ class Odd(FakeRenderer):
     [*((one_shot, mode) for mode in ONE_SHOT), *((persistent, mode) for mode in PERSISTENT)],
 )
 def test_one_fault_costs_one_result(
-    way: Callable[[str], Renderer], mode: str, tmp_path: Path
+    way: Callable[[str], Renderer], mode: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if not REFUSED.get(mode, True):
+        pytest.skip("this system cannot refuse it")
+    monkeypatch.setenv("MISBEHAVE_OUTSIDE", str(tmp_path / "escaped"))
     odd, right = Odd(way(mode)), student(name="right")
     cases = prepared("snell", "slab")
     timeout_s = TIMEOUT_S if mode == "hang" else PATIENCE_S
@@ -123,6 +135,7 @@ def test_one_fault_costs_one_result(
     assert {c.status for c in checks_of(summary, "right")} == {Verdict.PASS}
     assert summary.exit_code == 3
     assert not list(tmp_path.rglob("unpickled"))
+    assert not (tmp_path / "escaped").exists()
     assert odd.slowest < timeout_s + LATE_S
     kind = "run for each image" if way is one_shot else "kept alive"
     outcome = f"ERROR “{expected}”, all other results stand; the slowest took {odd.slowest:.2f} s"
