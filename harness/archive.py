@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import combinations
 from pathlib import Path, PurePosixPath
 
@@ -28,10 +28,9 @@ from harness.scene.fingerprint import fingerprint
 
 LOG_LINES = 40
 PLATFORM = f"{platform.system()} {platform.machine()}"
-# The range of all difference maps, so that they can be compared: a float32 renderer's errors show
-# as dark, what an eye could see as bright. Noise of a sampled picture needs a wider one.
-DIFFERENCE_LIMIT = 1e-3
-NOISE_LIMIT = 0.1
+# The range of all difference maps, logarithmic, the same for all renderers and cases, and that of
+# the page's own maps: rounding in single precision is dark, what an eye could see is bright.
+LEAST_DIFFERENCE, LARGEST_DIFFERENCE = 1e-9, 1.0
 
 
 def folder_name(case_id: str) -> str:
@@ -66,17 +65,27 @@ class Archive:
         judgement: Judgement,
         seconds: Mapping[str, float],
         settings: RenderSettings,
+        translated: Callable[[str, Path], None],
         *,
         quality: str,
         started: str,
         wall_s: float,
     ) -> CaseRecord:
-        """Writes the images of a case, its scene and its record; returns the record."""
+        """Writes the images of a case, its scene and its record; returns the record.
+
+        `translated(name, folder)` writes what a renderer was given into a folder, where that is
+        not scene.json.
+        """
         loaded, name = case.loaded, folder_name(case.loaded.id)
         self.discard(name)
         scene_json = case.scene.model_dump_json()
         record.write_text(self.root / "scenes" / f"{name}.json", scene_json)
-        runs = [self._run(case, c, name, results, judgement, seconds, settings) for c in contenders]
+        runs = [
+            self._run(case, c, name, results, judgement, seconds, settings).model_copy(
+                update={"files": self._given(c.name, name, translated)}
+            )
+            for c in contenders
+        ]
         pack = f"data/{name}.js"
         write_pack(
             self.root / pack, loaded.id, _pictures(case, contenders, results), judgement.rays
@@ -174,6 +183,18 @@ class Archive:
             stored=contender.stored,
         )
 
+    def _given(
+        self, renderer: str, name: str, translated: Callable[[str, Path], None]
+    ) -> dict[str, str]:
+        """Writes what a renderer was given; the paths of the files by their names."""
+        folder = self.root / "scenes" / name / renderer
+        translated(renderer, folder)
+        written = sorted(path for path in folder.rglob("*") if path.is_file())
+        return {
+            path.relative_to(folder).as_posix(): path.relative_to(self.root).as_posix()
+            for path in written
+        }
+
     def _images(
         self, case: PreparedCase, renderer: str, name: str, mine: Mapping[str, object]
     ) -> list[ImageFile]:
@@ -218,12 +239,11 @@ class Archive:
             ):  # fmt: skip
                 pictures[contender.name] = image.pixels
         maps = []
-        noisy = {c.name for c in contenders if c.preflight and c.preflight.noisy}
+        low, limit = LEAST_DIFFERENCE, LARGEST_DIFFERENCE
         for a, b in combinations(pictures, 2):
-            limit = NOISE_LIMIT if noisy & {a, b} else DIFFERENCE_LIMIT
             path = f"images/{name}/difference-{a}-{b}.webp"
-            write_difference(pictures[a], pictures[b], limit, self.root / path)
-            maps.append(DifferenceMap(a=a, b=b, path=path, limit=limit, unit="radiance"))
+            write_difference(pictures[a], pictures[b], limit, self.root / path, low)
+            maps.append(DifferenceMap(a=a, b=b, path=path, limit=limit, unit="radiance", low=low))
         return maps
 
 

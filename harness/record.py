@@ -141,13 +141,17 @@ class ImageFile(Model):
 
 
 class DifferenceMap(Model):
-    """|a - b| as a picture, in the colours of `harness.report.colours` from 0 to `limit`."""
+    """|a - b| as a picture, in the colours of `harness.report.colours` up to `limit`.
+
+    They are logarithmic from `low`; where that is 0 they are linear from 0.
+    """
 
     a: str
     b: str
     path: str
     limit: float
     unit: str
+    low: float = 0.0
 
 
 class RendererRun(Model):

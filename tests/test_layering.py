@@ -220,7 +220,7 @@ def test_nothing_is_pickled(file: str) -> None:
 
 
 def test_the_command_line_loads_nothing_heavy() -> None:
-    """Not even `--help`, which imports every command."""
+    """Not even `--help`, which imports every command, and answers before one has let go the key."""
     code = (
         "import sys, harness.cli\n"
         "harness.cli.main(['--help'], standalone_mode=False)\n"
@@ -230,7 +230,7 @@ def test_the_command_line_loads_nothing_heavy() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert not HEAVY & set(done.stdout.splitlines()[-1].split())
+    assert not (HEAVY | {"numpy", "pydantic", "rich"}) & set(done.stdout.splitlines()[-1].split())
 
 
 @pytest.mark.parametrize("file", sources("harness", "tracer"))

@@ -107,3 +107,21 @@ def checks_of(cases: list[LoadedCase]) -> int:
         )
         total += len(judge.judge().checks)
     return total
+
+
+def test_every_page_of_the_documentation_can_be_reached_from_it() -> None:
+    """By links, from page to page; what nothing leads to is read by nobody."""
+    root = Path(__file__).resolve().parent.parent
+    reached, waiting = set[Path](), [root / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        page = page / "README.md" if page.is_dir() else page
+        if page in reached:
+            continue
+        assert page.is_file(), page
+        reached.add(page)
+        if page.suffix == ".md":
+            links = re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
+            waiting += [(page.parent / link).resolve() for link in links if "://" not in link]
+    pages = {p for pattern in ("*.md", "docs/**/*.md") for p in root.glob(pattern)}
+    assert not {str(p.relative_to(root)) for p in pages - reached}

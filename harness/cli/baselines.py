@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from harness.cli.options import BASELINES
 from harness.record import BaselineState, Summary
 
 if TYPE_CHECKING:
     from harness.baseline.approve import Plan
     from harness.baseline.source import Baselines
 
-FOLDER = Path("references")
 MOST_LINES = 40
 STYLE = {
     BaselineState.SAME: "green", BaselineState.DRIFTED: "yellow",
@@ -25,18 +23,13 @@ STYLE = {
     BaselineState.RENDERER_CHANGED: "yellow", BaselineState.REGRESSED: "bold red",
     BaselineState.MISSING: "bold red", BaselineState.STALE: "bold red",
 }  # fmt: skip
-reason_option = click.option("--reason", default="", help="Why this is how it should be.")
-run_option = click.option(
-    "--run", "folder", type=click.Path(path_type=Path, file_okay=False),
-    default=Path("reports/latest"), show_default=True, help="Folder of the run.",
-)  # fmt: skip
 
 
 def default_baseline() -> str:
     """The folder of this repository; where it has none, the one that came with snellcheck."""
     from harness.data import references_root
 
-    return str(FOLDER if FOLDER.is_dir() else references_root())
+    return str(BASELINES if BASELINES.is_dir() else references_root())
 
 
 def stand_in_sources() -> list[Baselines]:
@@ -44,7 +37,7 @@ def stand_in_sources() -> list[Baselines]:
     from harness.baseline.source import open_baselines
     from harness.data import references_root
 
-    folders = dict.fromkeys(f.resolve() for f in (FOLDER, references_root()) if f.is_dir())
+    folders = dict.fromkeys(f.resolve() for f in (BASELINES, references_root()) if f.is_dir())
     return [open_baselines(str(folder)) for folder in folders]
 
 

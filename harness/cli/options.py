@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from harness.scene.load import LoadedCase
 
 DEFAULT_OUT = Path("reports/latest")
+BASELINES = Path("references")
 
 scenes_option = click.option(
     "--scenes",
@@ -46,6 +47,12 @@ cache_option = click.option(
 history_option = click.option(
     "--history/--no-history", "history", default=True, show_default=True,
     help="Add the figures to the history of past runs.",
+)  # fmt: skip
+
+reason_option = click.option("--reason", default="", help="Why this is how it should be.")
+run_option = click.option(
+    "--run", "folder", type=click.Path(path_type=Path, file_okay=False),
+    default=DEFAULT_OUT, show_default=True, help="Folder of the run.",
 )  # fmt: skip
 
 

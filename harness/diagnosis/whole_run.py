@@ -198,7 +198,7 @@ def _as_diagnosis(
     if varied:
         sentence += f", and with a size of their own {len(varied)} more"
     if best.broken:
-        sentence += f", but it should show in {best.broken[0]}, too, where nothing is off"
+        sentence += f", although {best.broken[0]}, where it would show, is right"
     return Diagnosis(
         renderer=renderer, sentence=sentence, cause=cause, runner_up=_cause(second, mine, iors),
         deviation=_deviation(mine), rays=sum(d.rays for d in mine.values()),

@@ -140,7 +140,9 @@ class Renderer(Protocol):
     """The one seam between harness and renderers.
 
     A renderer may also have `concurrency`, how many renders at a time serve it best (1 where it
-    says nothing), and `close()`, which ends its process. `fingerprint()` is what its results may be
+    says nothing), and `close()`, which ends its process. `translates` is true where `emit` writes
+    another language than scene.json without starting anything: then the run keeps what it writes
+    beside the records. `fingerprint()` is what its results may be
     kept under from run to run: a text that changes whenever an image might, told without starting
     the renderer, or None where that cannot be known.
     """

@@ -106,12 +106,6 @@ class _Engine:
         """Version and variant, since results depend on both."""
         return f"{self._mi.__version__} ({self.variant})"
 
-    def emit(self, scene: ResolvedScene, folder: Path) -> Path:
-        """Writes XML and assets for Mitsuba's own command line."""
-        from harness.translate.mitsuba_xml import write
-
-        return write(scene, folder)
-
     def health(self) -> Health:
         """What was found about variants and libLLVM; the render is the caller's."""
         choice = variants.choose()

@@ -28,6 +28,8 @@ from harness.scene.resolved import ResolvedScene
 
 Environment = Mapping[str, str] | Callable[[], Mapping[str, str]] | None
 
+Translate = Callable[[ResolvedScene, Path], Path]
+
 START_S = 60.0  # to import the engine and say hello
 
 
@@ -60,7 +62,8 @@ class WorkerRenderer:
     that the worker tells, so asking for them may start it; one that does not start has none, and
     `version` and `render` say why. `env` is added to the environment; a function is called at
     each start. `remedy` is the command that installs a missing engine. `fingerprint` is as in
-    `harness.renderers.base.Renderer`.
+    `harness.renderers.base.Renderer`. `translate` writes what the engine is given into a folder
+    and returns the main file, where that takes no engine.
 
     Threads may share one renderer, and wait for each other. After a fork, the child process has
     a worker of its own.
@@ -75,8 +78,11 @@ class WorkerRenderer:
         env: Environment = None,
         remedy: str = "",
         fingerprint: Callable[[], str | None] = lambda: None,
+        translate: Translate | None = None,
     ) -> None:
         self.fingerprint = fingerprint
+        self._translate = translate
+        self.translates = translate is not None
         self._name = name
         self._program = engine_program(engine) if isinstance(engine, str) else engine
         self._declared = capabilities
@@ -143,6 +149,8 @@ class WorkerRenderer:
 
     def emit(self, scene: ResolvedScene, folder: Path) -> Path:
         """What the engine makes of the scene where it can show it, or else scene.json."""
+        if self._translate is not None:
+            return self._translate(scene, folder)
         folder = folder.resolve()  # the worker's working folder is another
         folder.mkdir(parents=True, exist_ok=True)
         scene_file = _write(scene, folder)

@@ -90,6 +90,8 @@ class PovRayRenderer:
         }
     )
 
+    translates = True
+
     def __init__(self, executable: str = "povray") -> None:
         self._executable = executable
         self._version: str | None = None

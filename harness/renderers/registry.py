@@ -11,10 +11,14 @@ import functools
 from collections.abc import Callable
 from importlib.metadata import EntryPoint, PackageNotFoundError, distribution, entry_points
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from harness.errors import InputError, RendererFailed, RendererMissing, nearest
 from harness.fingerprint import code_digest, combined, versions
 from harness.renderers.base import Renderer
+
+if TYPE_CHECKING:
+    from harness.scene.resolved import ResolvedScene
 
 GROUP = "snellcheck.renderers"
 Factory = Callable[[], Renderer]
@@ -138,8 +142,14 @@ def _mitsuba(name: str, engine: str) -> Renderer:
     target = f"harness.renderers.mitsuba:{engine}"
     return WorkerRenderer(
         name, target, env=child_environment, remedy=INSTALL_MITSUBA,
-        fingerprint=_fingerprint_of_mitsuba,
+        fingerprint=_fingerprint_of_mitsuba, translate=_to_mitsuba_xml,
     )  # fmt: skip
+
+
+def _to_mitsuba_xml(scene: ResolvedScene, folder: Path) -> Path:
+    from harness.translate.mitsuba_xml import write
+
+    return write(scene, folder)
 
 
 def _fingerprint_of_mitsuba() -> str | None:

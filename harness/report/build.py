@@ -23,6 +23,8 @@ from harness.record import CaseRecord, Summary, SummaryCase, Verdict
 from harness.report import changes, chart, mathml, overview, quantity, view
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
 from harness.report.detection import detection
+from harness.report.differences import differences
+from harness.report.given import given_files
 from harness.report.links import RunFolder, clean, page_name, url
 from harness.report.pagedata import case_data
 from harness.report.trends import Trends
@@ -152,6 +154,7 @@ class _Report:
         """A hash of all that a case's page shows, but for the time of the run."""
         images = [image for run in record.runs for image in run.images]
         named = [*record.files.values(), record.pack, *record.other_packs.values()]
+        named += [path for run in record.runs for path in run.files.values()]
         named += [d.path for d in record.differences]
         named += [name for image in images for name in (image.path, image.picture, image.thumbnail)]
         folder = RunFolder(self.folder)
@@ -184,10 +187,11 @@ class _Report:
             runs=runs,
             pictured=any(images for _, _, images in runs),
             coarse=all(i.width < COARSE for run in record.runs for i in run.images),
-            differences=view.differences(record, folder),
+            differences=differences(record, folder),
             charts=charts,
             record_href=folder.href(f"records/{path.name}"),
             files=_files(record, folder),
+            given={run.name: given_files(run, folder) for run, _, _ in runs},
             neighbours=self._neighbours(record.id),
             data=case_data(record, folder, self.colours, charts),
         )
@@ -262,12 +266,8 @@ def _parameters(record: CaseRecord) -> list[tuple[str, str]]:
 
 
 def _files(record: CaseRecord, folder: RunFolder) -> list[tuple[str, str]]:
-    """Links to the files that are there, those of the case before those of its renderers."""
-    named = list(record.files.items())
-    named += [
-        (f"{run.name}: {key}", path) for run in record.runs for key, path in run.files.items()
-    ]
-    found = ((clean(name), folder.href(path)) for name, path in named)
+    """Links to the files of the case that are there."""
+    found = ((clean(name), folder.href(path)) for name, path in record.files.items())
     return [(name, href) for name, href in found if href]
 
 
@@ -300,6 +300,7 @@ def environment() -> jinja2.Environment:
         number=quantity.number,
         seconds=quantity.seconds,
         count=quantity.count,
+        size=quantity.size,
         check=view.check_view,
     )
     return environment

@@ -69,12 +69,13 @@ def write_thumbnail(pixels: Floats, path: Path, *, longest: int = 192, white: fl
     return _write(display(shrink(_rgb(pixels), longest), white), path)
 
 
-def difference_colours(a: Floats, b: Floats, limit: float) -> Bytes:
+def difference_colours(a: Floats, b: Floats, limit: float, low: float = 0.0) -> Bytes:
     """|a - b| of two linear images (H, W, 3) as colours (H, W, 3); see `colours.SCALE`.
 
-    Of a pixel's three channels the largest difference counts. The scale is linear from 0 to
-    `limit`, the same for every map of that limit; what exceeds it is `colours.BEYOND`, and what is
-    not finite in either image is `colours.NOT_FINITE`. Raises InputError where the sizes differ.
+    Of a pixel's three channels the largest difference counts. The scale is logarithmic from `low`,
+    which is the colour of all that is less, to `limit`; with `low` 0 it is linear from 0. What
+    exceeds `limit` is `colours.BEYOND`, and what is not finite in either image is
+    `colours.NOT_FINITE`. Raises InputError where the sizes differ.
     """
     if a.shape != b.shape:
         raise InputError.of(
@@ -83,10 +84,15 @@ def difference_colours(a: Floats, b: Floats, limit: float) -> Bytes:
         )
     if not (np.isfinite(limit) and limit > 0):
         raise InputError.of("limit of a difference map", value=repr(limit), expected="> 0")
+    if not 0 <= low < limit:
+        raise InputError.of("least difference of a map", value=repr(low), expected=f"0 … {limit:g}")
     with np.errstate(invalid="ignore"):
         off = np.abs(_rgb(a) - _rgb(b)).max(axis=-1)
     finite = np.isfinite(off)
-    share = np.where(finite, off / limit, 0.0)
+    known = np.where(finite, off, 0.0)
+    share: Floats = known / limit
+    if low:
+        share = np.log(np.maximum(known, low) / low) / np.log(limit / low)
     knots = np.linspace(0.0, 1.0, len(SCALE))
     table = np.asarray(SCALE, dtype=np.float64)
     channels = [np.interp(share, knots, table[:, channel]) for channel in range(3)]
@@ -96,9 +102,9 @@ def difference_colours(a: Floats, b: Floats, limit: float) -> Bytes:
     return shown
 
 
-def write_difference(a: Floats, b: Floats, limit: float, path: Path) -> Path:
+def write_difference(a: Floats, b: Floats, limit: float, path: Path, low: float = 0.0) -> Path:
     """Writes the map of `difference_colours` at full size. Returns `path`."""
-    return _write(difference_colours(a, b, limit), path)
+    return _write(difference_colours(a, b, limit, low), path)
 
 
 def _rgb(pixels: Floats) -> NDArray[np.float64]:

@@ -81,3 +81,11 @@ def seconds(value: float) -> str:
 def count(n: int, one: str, many: str = "") -> str:
     """A number with its noun: "1 check", "7 checks"."""
     return f"{n:,}".replace(",", NARROW_SPACE) + " " + (one if n == 1 else many or one + "s")
+
+
+def size(octets: int) -> str:
+    """The size of a file: "812 bytes", "3.4 kB", "12 MB"."""
+    if octets < 1000:
+        return count(octets, "byte")
+    power, unit = (1e3, "kB") if octets < 999_500 else (1e6, "MB")
+    return f"{octets / power:.3g}{NARROW_SPACE}{unit}"

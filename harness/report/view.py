@@ -17,7 +17,6 @@ from harness.record import (
     CaseRecord,
     Check,
     Curve,
-    DifferenceMap,
     ImageFile,
     RendererRun,
     Summary,
@@ -54,6 +53,8 @@ class CheckView:
     limit: str
     used: str
     bar: float  # 0 … 1, for drawing
+    largest: str  # anywhere, where `value` is of the ray that uses most of its own tolerance
+    pixel: tuple[int, int] | None  # where that one is
 
     @property
     def over(self) -> bool:
@@ -98,7 +99,21 @@ def check_view(check: Check) -> CheckView:
         limit="" if tolerance is None else limit,
         used=share(ratio),
         bar=0.0 if ratio is None else 1.0 if math.isnan(ratio) else min(1.0, ratio),
+        largest=_largest(check),
+        pixel=_worst_pixel(check),
     )
+
+
+def _largest(check: Check) -> str:
+    most = check.detail.get("max")
+    if check.value is None or not isinstance(most, float) or not most > 1.25 * abs(check.value):
+        return ""
+    return with_unit(number(most, digits=3), clean(check.unit))
+
+
+def _worst_pixel(check: Check) -> tuple[int, int] | None:
+    x, y = (check.detail.get(f"worst_pixel_{axis}") for axis in "xy")
+    return (int(x), int(y)) if isinstance(x, int | float) and isinstance(y, int | float) else None
 
 
 def _ratio(error: float, tolerance: float) -> float:
@@ -125,6 +140,8 @@ class Picture:
     role: str
     width: int
     height: int
+    sha256: str
+    kind: str  # of the linear data: "EXR"
 
 
 def picture(image: ImageFile, folder: RunFolder) -> Picture:
@@ -138,6 +155,8 @@ def picture(image: ImageFile, folder: RunFolder) -> Picture:
         role=clean(image.role),
         width=image.width,
         height=image.height,
+        sha256=clean(image.sha256),
+        kind=clean(image.path.rpartition(".")[2].upper()),
     )
 
 
@@ -145,43 +164,6 @@ def main_picture(images: Sequence[ImageFile], folder: RunFolder) -> Picture | No
     """The image proper before any probe."""
     ordered = sorted(images, key=lambda image: image.role != "image")
     return picture(ordered[0], folder) if ordered else None
-
-
-@dataclass(frozen=True)
-class DifferenceView:
-    a: str
-    b: str
-    href: str | None
-    figures: list[CheckView]  # the checks that compare just these two
-
-
-@dataclass(frozen=True)
-class DifferenceGroup:
-    """Maps that share one scale, and so one colour bar."""
-
-    limit: str
-    half: str
-    maps: list[DifferenceView]
-
-
-def differences(record: CaseRecord, folder: RunFolder) -> list[DifferenceGroup]:
-    groups: dict[tuple[float, str], list[DifferenceMap]] = {}
-    for item in record.differences:
-        groups.setdefault((item.limit, item.unit), []).append(item)
-    return [
-        DifferenceGroup(
-            limit=with_unit(number(limit, digits=3), clean(unit)),
-            half=with_unit(number(limit / 2, digits=3), clean(unit)),
-            maps=[_difference(item, record.checks, folder) for item in items],
-        )
-        for (limit, unit), items in groups.items()
-    ]
-
-
-def _difference(item: DifferenceMap, checks: Iterable[Check], folder: RunFolder) -> DifferenceView:
-    pair = {item.a, item.b}
-    between = [check for check in checks if {check.renderer, check.against} == pair]
-    return DifferenceView(item.a, item.b, folder.href(item.path), sorted_views(between))
 
 
 # --- index ----------------------------------------------------------------------------------------

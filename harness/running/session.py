@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
 
 from harness import plan
 from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
+from harness.errors import RendererError
 from harness.judging import spectral
 from harness.judging.judge import CaseJudge
 from harness.judging.pairs import camera_shift
@@ -32,6 +36,7 @@ from harness.running.lanes import (
     threads,
 )
 from harness.running.memo import Memo
+from harness.scene.resolved import ResolvedScene
 from harness.verdict import unmeasured
 
 
@@ -53,6 +58,7 @@ class _CaseState:
     pending: int = 0
     key: str | None = None  # under which the case is kept once it is judged
     contenders: list[Contender] | None = None  # those of this case, stored ones among them
+    given: dict[str, ResolvedScene] = field(default_factory=dict)  # what renderers got first
 
 
 @dataclass(frozen=True)
@@ -206,6 +212,8 @@ class Session:
         for index, state in enumerate(self.states):
             if self.finished[index] is None:
                 jobs = self._jobs(contender, state.case)
+                if jobs and contender.name in self.names:
+                    state.given[contender.name] = jobs[0].scene
                 state.pending += len(jobs)
                 self.total += len(jobs)
                 self.lanes[contender.name].submit(index, jobs)
@@ -255,6 +263,7 @@ class Session:
         judgement = CaseJudge(state.case, contenders, results, self.helper).judge()
         written = self.storage.archive.write_case(
             state.case, contenders, results, judgement, state.seconds, self.settings,
+            partial(self._translated, state),
             quality=self.quality, started=self.started, wall_s=time.perf_counter() - state.started,
         )  # fmt: skip
         if state.key is not None and self.storage.lasting is not None:
@@ -264,6 +273,14 @@ class Session:
             )
         self._finish(index, written)
         state.results.clear()
+        state.given.clear()
+
+    def _translated(self, state: _CaseState, name: str, folder: Path) -> None:
+        """Writes into `folder` what the renderer `name` was given first, where it is translated."""
+        renderer, scene = self.lanes[name].renderer, state.given.get(name)
+        if scene is not None and getattr(renderer, "translates", False):
+            with contextlib.suppress(RendererError):  # its results say what is wrong with it
+                renderer.emit(scene, folder)
 
     def _contenders_of(self, state: _CaseState) -> list[Contender]:
         """The renderers of a case; once all are known, for stored pictures are added to it."""

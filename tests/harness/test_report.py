@@ -280,7 +280,7 @@ def test_nan_is_shown_as_such(run: Path) -> None:
 def test_differences_share_a_colour_bar_with_their_limit(run: Path) -> None:
     page = case_page(run, "ball-beach")
     assert page.source.count("<linearGradient") == 1
-    assert "0.1" in page.text
+    assert "1\u202f×\u202f10⁻⁹" in page.text
     assert [a["alt"] for _, a in page.elements if "Difference of" in a.get("alt", "")] == [
         "Difference of tracer and povray",
         "Difference of tracer and mitsuba",
@@ -296,6 +296,19 @@ def test_case_page_links_record_scene_and_linear_data(run: Path) -> None:
     assert "../records/ball-beach.json" in links
     assert "../scenes/ball-beach/scene.json" in links
     assert "../images/ball-beach/tracer.raw" in links
+
+
+def test_case_page_shows_what_renderers_were_given(run: Path) -> None:
+    page = case_page(run, "ball-beach")
+    links = set(page.links())
+    assert "../scenes/ball-beach/povray/scene.pov" in links
+    assert "../scenes/ball-beach/povray/ball.ply" in links
+    assert "sphere { <0, 0, 0>, 1 } // </pre><script>" in page.text
+    assert "Only its beginning" in page.text
+    assert page.source.count('<details class="given">') == 1  # a mesh is no text
+    (record,) = (run / "records").glob("ball-beach.json")
+    for image in (i for r in records.read_case(record).runs for i in r.images):
+        assert image.sha256[:16] in page.text
 
 
 # --- states ---------------------------------------------------------------------------------------

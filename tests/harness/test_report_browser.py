@@ -10,10 +10,14 @@ pytest.importorskip("playwright.sync_api", reason="uv pip install playwright")
 
 from playwright.sync_api import Browser, Locator, Page
 
+from harness.record import CaseRecord, Table, Verdict
 from harness.report import write_report
-from tests.harness.report_fixture import make_run
+from harness.scene.load import find
+from tests.harness.report_fixture import make_run, summary_of, write_run
 
 pytestmark = pytest.mark.browser
+
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +104,31 @@ def test_pages_fit_their_window(page: Page, run: Path, width: int) -> None:
     for path in (run / "index.html", *sorted((run / "cases").glob("*.html"))):
         page.goto(path.as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") <= width, path.name
+
+
+def test_the_words_and_formulas_of_every_scene_fit(page: Page, tmp_path: Path) -> None:
+    """Of each case the page as far as its scene decides it: no picture, no check."""
+    cases = [
+        CaseRecord(
+            id=loaded.id, case=loaded.case, family=loaded.model.family, title=loaded.model.title,
+            description=loaded.model.description.strip(), lecture=loaded.model.lecture,
+            sources=list(loaded.model.sources), formula=loaded.model.formula,
+            parameters=dict(loaded.parameters), scene_sha256="0" * 64, quality="normal",
+            scene_file=f"{loaded.file.parent.name}/{loaded.file.name}", snellcheck_version="0.1.0",
+            started="2026-01-02T03:04:05+00:00", wall_s=1, status=Verdict.SKIP, runs=[], checks=[],
+            tables=[Table.model_validate(t.model_dump(mode="json")) for t in loaded.model.tables],
+        )
+        for loaded in {one.case: one for one in find((), SCENES)}.values()
+    ]  # fmt: skip
+    assert len(cases) > 50
+    write_report(write_run(tmp_path, cases, summary_of(cases)))
+    page.set_viewport_size({"width": 390, "height": 900})
+    wide = []
+    for path in sorted((tmp_path / "cases").glob("*.html")):
+        page.goto(path.as_uri(), wait_until="domcontentloaded")
+        if (width := page.evaluate("document.documentElement.scrollWidth")) > 390:
+            wide.append(f"{path.name}: {width}")
+    assert not wide
 
 
 def test_without_script_everything_is_there(browser: Browser, run: Path) -> None:

@@ -319,6 +319,17 @@ def test_difference_colours() -> None:
     ]
 
 
+def test_logarithmic_difference_colours() -> None:
+    """Nine decades: each takes the same share of the scale, and zero is as dark as can be."""
+    a = grey(0.0, 1e-10, 1e-9, 10**-4.5, 1.0, 1.001)
+    shown = pictures.difference_colours(a, np.zeros_like(a), 1.0, low=1e-9)[0]
+    middle = SCALE[len(SCALE) // 2]
+    expected = [SCALE[0], SCALE[0], SCALE[0], middle, SCALE[-1], BEYOND]
+    assert [tuple(pixel) for pixel in shown.tolist()] == expected
+    with pytest.raises(InputError, match="least difference"):
+        pictures.difference_colours(a, a, 1.0, low=1.0)
+
+
 def test_infinity_minus_infinity_is_no_agreement() -> None:
     both = grey(math.inf)
     assert pictures.difference_colours(both, both, 1.0)[0, 0].tolist() == list(NOT_FINITE)

@@ -27,7 +27,7 @@ from harness.report import write_report
 from harness.report.links import page_name
 from harness.run import Progress, run
 from harness.scene.resolved import ResolvedScene
-from tests.fakes import FakeRenderer
+from tests.fakes import FakeRenderer, grey
 from tests.fakes.student import CAPABILITIES, student
 from tests.harness.tiny import checks_of, prepared, run_tiny
 
@@ -506,3 +506,32 @@ def test_light_that_was_not_followed_is_recorded_and_shown(tmp_path: Path) -> No
     write_report(tmp_path)
     (page,) = tmp_path.rglob(page_name(case.id))
     assert page.read_text("utf-8").count("light not followed") == 1
+
+
+class Translating(Given):
+    """A student that is given scenes in a language of its own, and cannot say some of them."""
+
+    translates = True
+    mute = False
+
+    def emit(self, scene: ResolvedScene, folder: Path) -> Path:
+        if self.mute:
+            raise RendererUnsupported("has no word for it")
+        folder.mkdir(parents=True)
+        (folder / "parts").mkdir()
+        (folder / "parts" / "ball.ply").write_bytes(b"ply\n")
+        (folder / "scene.odd").write_text(f"{len(scene.solids)} solids")
+        return folder / "scene.odd"
+
+
+def test_what_renderers_were_given_is_kept_beside_the_record(tmp_path: Path) -> None:
+    odd = Translating(grey, lambda _: False)
+    run_tiny(tmp_path, odd, student(), cases=["ball*"])
+    (path,) = (tmp_path / "records").glob("*.json")
+    files = {r.name: r.files for r in record.read_case(path).runs}
+    assert files["student"] == {}
+    assert set(files["odd"]) == {"scene.odd", "parts/ball.ply"}
+    assert (tmp_path / files["odd"]["scene.odd"]).read_text() == "1 solids"
+    odd.mute = True
+    run_tiny(tmp_path, odd, student(), cases=["ball*"])
+    assert {r.name: r.files for r in record.read_case(path).runs} == {"student": {}, "odd": {}}

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from harness.cli.baselines import FOLDER, reason_option, run_option, show_plans
 from harness.cli.errors import reports_errors
+from harness.cli.options import BASELINES, reason_option, run_option
 
 
 @click.command(name="approve")
@@ -20,7 +20,7 @@ from harness.cli.errors import reports_errors
     help="A file of choices that the report's page wrote.",
 )  # fmt: skip
 @click.option(
-    "--baseline", "target", type=click.Path(path_type=Path, file_okay=False), default=FOLDER,
+    "--baseline", "target", type=click.Path(path_type=Path, file_okay=False), default=BASELINES,
     show_default=True, help="Folder to write to.",
 )  # fmt: skip
 @click.option("--by", default="", help="Who approves.  [default: as git knows you]")
@@ -47,6 +47,7 @@ def command(
     from harness.baseline.run_folder import read_run
     from harness.baseline.source import Baselines, open_baselines
     from harness.baseline.store import Store
+    from harness.cli.baselines import show_plans
     from harness.errors import InputError
 
     if bool(case) == bool(choices):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from harness.cli.baselines import default_baseline, run_option, show_states
 from harness.cli.errors import reports_errors
+from harness.cli.options import run_option
 
 
 @click.command(name="check")
@@ -47,6 +47,7 @@ def command(
     from harness.baseline.select import of_run, selector
     from harness.baseline.source import open_baselines
     from harness.baseline.trend import deviations, read_history, trends
+    from harness.cli.baselines import default_baseline, show_states
     from harness.report import write_report
 
     run = read_run(folder)

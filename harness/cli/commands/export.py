@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from harness.cli.baselines import run_option
 from harness.cli.errors import reports_errors
+from harness.cli.options import run_option
 
 
 @click.command(name="export")

@@ -19,7 +19,7 @@ const up = (high: number, decades: number) => (exposure: number): Scale => {
 };
 
 export const MAPS: Partial<Record<Mode, MapMode>> = {
-  diff: { title: "|A − B|", unit: "radiance", scale: up(1, 8), figures: difference },
+  diff: { title: "|A − B|", unit: "radiance", scale: up(1, 9), figures: difference },
   relative: {
     title: "(A − B) / max(|A|, |B|)",
     unit: "",
