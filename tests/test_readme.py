@@ -10,7 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 from harness.cli import main
-from harness.scene.load import load_cases
+from harness.data import scenes_root
+from harness.judging.judge import CaseJudge
+from harness.judging.results import Contender, Results
+from harness.plan import Form, PreparedCase, prepare
+from harness.record import Verdict
+from harness.renderers.base import Capability
+from harness.scene.load import LoadedCase, load_cases, scene_files
 
 README = (Path(__file__).resolve().parent.parent / "README.md").read_text(encoding="utf-8")
 
@@ -63,6 +69,44 @@ def test_the_cases_that_it_names_exist() -> None:
     for case in named:
         listed = CliRunner().invoke(main, ["list", case])
         assert listed.exit_code == 0, listed.output
+
+
+def test_the_catalogue_is_as_large_as_it_says() -> None:
+    scenes = [load_cases(path) for path in scene_files(scenes_root())]
+    core = [cases for cases in scenes if "core" in cases[0].model.tags]
+    everything = [case for cases in scenes for case in cases]
+    hundreds = checks_of(everything) // 100
+    for said in (
+        f"The core is {len(core)} scenes",
+        f"all\n{len(scenes)} of them",
+        f"{len(everything)} cases",
+        f"{hundreds // 10},{hundreds % 10}00 checks",
+    ):
+        assert said in README
+
+
+def checks_of(cases: list[LoadedCase]) -> int:
+    """How many checks a run of all built-in renderers makes, told without rendering anything.
+
+    All are judged as missing. Where a pair of pictures is a SKIP it is one for each side, which
+    makes some ten checks more than there are in a run.
+    """
+    followers = ("tracer", "mitsuba-exact")
+    contenders = [
+        Contender(
+            name, "1", frozenset({Capability.RAYS} if name in followers else ()), None,
+            Verdict.SKIP, "missing",
+        )
+        for name in (*followers, "mitsuba", "povray", "povray-stock")
+    ]  # fmt: skip
+    any_scene, total = prepare(cases[0]).scene, 0
+    for case in cases:
+        variants = tuple(Form(v.name, any_scene, {}, v.scale) for v in case.model.variants)
+        judge = CaseJudge(
+            PreparedCase(case, any_scene, variants), contenders, Results({}, 8, 8), "tracer"
+        )
+        total += len(judge.judge().checks)
+    return total
 
 
 def test_every_page_of_the_documentation_can_be_reached_from_it() -> None:

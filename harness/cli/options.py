@@ -114,3 +114,16 @@ def named_by(cases: Sequence[PreparedCase]) -> list[Renderer]:
     named = {name for check in checks for name in check.renderers}
     available = registry.ONLY_WHERE_NAMED & named & registry.available().keys()
     return [registry.create(name) for name in sorted(available)]
+
+
+def those_that_must_run(chosen: Sequence[Renderer], named: Sequence[str]) -> list[str]:
+    """Those of `chosen` that no stored result can excuse from running.
+
+    For who brings a renderer of their own the registered ones are what it is held against, and
+    what is stored of them will do, unless they are `named`. Without one they are asked for.
+    """
+    from harness.renderers import registry
+
+    own = {renderer.name for renderer in chosen} - registry.available().keys()
+    wanted = own | set(named) if own else {renderer.name for renderer in chosen}
+    return [renderer.name for renderer in chosen if renderer.name in wanted]

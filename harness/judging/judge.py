@@ -41,7 +41,7 @@ from harness.record import Check, Curve, Diagnosis, Verdict
 from harness.renderers.base import Capability
 from harness.scene import model
 from harness.scene.resolved import ResolvedScene
-from harness.verdict import check_id, judge, unmeasured
+from harness.verdict import judge, unmeasured
 
 RAYS = {
     Observable.EXIT_POINT: ray_observables.exit_point,
@@ -156,7 +156,7 @@ class CaseJudge:
     ) -> tuple[Check, Curve | None]:
         spec = in_form(spec, form)
         if contender.stored is not None:
-            return self._stored(spec, contender, "truth"), None
+            return contender.remembered(spec, "truth", [contender.name]), None
         try:
             comparison = self._compare(spec, contender, form)
         except NotAvailable as gap:
@@ -170,7 +170,7 @@ class CaseJudge:
         probe, base = self._case.probe(spec.probe), self._probed.forms[0]
         spec = agreement(spec, form)
         if contender.stored is not None:
-            return self._stored(spec, contender, "variant")
+            return contender.remembered(spec, "variant", [contender.name])
         try:
             both = [
                 (
@@ -186,14 +186,6 @@ class CaseJudge:
         except (Unmeasurable, ValueError) as error:
             return unmeasured(spec, contender.name, "variant", Verdict.ERROR, str(error))
         return judge(spec, contender.name, "variant", comparison)
-
-    def _stored(self, spec: model.CheckSpec, contender: Contender, against: str) -> Check:
-        """The approved result of a renderer that is not there, marked as such."""
-        check = contender.stored_checks.get(check_id(spec, contender.name, against))
-        if check is None or contender.stored is None:
-            reason = f"{contender.reason}; nothing is stored for this check"
-            return unmeasured(spec, contender.name, against, Verdict.SKIP, reason)
-        return check.model_copy(update={"stored": [contender.name]})
 
     def _compare(self, spec: model.CheckSpec, contender: Contender, form: Form) -> Comparison:
         observable, preflight = Observable(spec.observable), contender.ready()

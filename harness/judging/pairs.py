@@ -29,7 +29,7 @@ from harness.record import Check, Verdict
 from harness.renderers.base import Capability, Image
 from harness.scene import model
 from harness.scene.resolved import ResolvedScene
-from harness.verdict import check_id, judge, unmeasured
+from harness.verdict import judge, unmeasured
 
 # float32 renderers start a ray this far from the surface that it leaves, lest they hit it again
 # (Mitsuba 8.9e-5, and we 1e-4 for it): of a ray through a corner of glass they lose shorter ways.
@@ -69,7 +69,8 @@ class PairJudge:
                 contender.stored is not None
                 and Capability.PIXEL_CENTRES not in contender.capabilities
             ):
-                yield self._stored(spec, contender)
+                # Its second seed is not stored, so that its noise cannot be told again.
+                yield contender.remembered(spec, self._helper, [contender.name, self._helper])
                 continue
             try:
                 self._results.picture(contender, plan.IMAGE)
@@ -87,14 +88,6 @@ class PairJudge:
         for contender in ready:
             if contender.ready().noisy:
                 yield from self._sampled(spec, contender)
-
-    def _stored(self, spec: model.CheckSpec, contender: Contender) -> Check:
-        """The approved comparison of a sampled picture, whose second seed is not stored."""
-        check = contender.stored_checks.get(check_id(spec, contender.name, self._helper))
-        if check is None:
-            reason = f"{contender.reason}; nothing is stored for this check"
-            return unmeasured(spec, contender.name, self._helper, Verdict.SKIP, reason)
-        return check.model_copy(update={"stored": [contender.name, self._helper]})
 
     def _all_pairs(self, spec: model.CheckSpec, exact: list[Contender]) -> Iterator[Check]:
         if len(exact) == 1:
@@ -118,12 +111,14 @@ class PairJudge:
         return self._exact(spec, contender, opponent)
 
     def _exact(self, spec: model.CheckSpec, a: Contender, b: Contender) -> Check:
+        stored = [c.name for c in (a, b) if c.stored is not None]
+        if len(stored) == 2:
+            return a.remembered(spec, b.name, stored)
         try:
             comparison = self._pair(a, b).compare(Observable(spec.observable))
         except (NotAvailable, Unmeasurable, SnellcheckError) as error:
             return unmeasured(spec, a.name, b.name, Verdict.ERROR, str(error))
         check = judge(spec, a.name, b.name, comparison)
-        stored = [c.name for c in (a, b) if c.stored is not None]
         return check.model_copy(update={"stored": stored})
 
     def _sampled(self, spec: model.CheckSpec, contender: Contender) -> Iterator[Check]:

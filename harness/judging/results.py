@@ -11,7 +11,9 @@ from harness.measure.precision import Precision
 from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Stored, Verdict
 from harness.renderers.base import Capability, Image, RayPaths
+from harness.scene.model import CheckSpec
 from harness.scene.resolved import Mesh, ResolvedScene
+from harness.verdict import check_id, unmeasured
 
 # How the reason of a renderer begins that is out because of its calibration.
 FAILED_PREFLIGHT = "failed its preflight: "
@@ -48,6 +50,18 @@ class Contender:
         if self.absent is not None or self.preflight is None:
             raise NotAvailable(self.absent or Verdict.ERROR, self.reason or "no preflight")
         return self.preflight
+
+    def remembered(self, spec: CheckSpec, against: str, stored: list[str]) -> Check:
+        """A check of a missing renderer in which nothing is live: SKIP, with what was approved.
+
+        `stored` names whose side it is. What was not measured now is no pass, whatever it was then.
+        """
+        check = self.stored_checks.get(check_id(spec, self.name, against))
+        if check is None:
+            reason = f"{self.reason}; nothing is stored for this check"
+            return unmeasured(spec, self.name, against, Verdict.SKIP, reason)
+        reason = f"{self.reason}; it was {check.status.value} then"
+        return check.model_copy(update={"stored": stored, "status": Verdict.SKIP, "reason": reason})
 
     def precision(self, scene: ResolvedScene) -> Precision:
         """Of its numbers in this scene: stored in float32, vertices make a mesh no better."""

@@ -47,6 +47,7 @@ class Capability(enum.StrEnum):
     TRANSLUCENT = "translucent"
     PICTURE = "picture"
     ABSORPTION = "absorption"
+    DISPERSION = "dispersion"  # by itself, all wavelengths in one picture
     FRESNEL = "fresnel"  # R and T weigh the lobes, unpolarised at each interface
     NESTED = "nested"  # solids inside solids
     PRIORITY = "priority"  # solids that share faces or overlap partly, by their priority

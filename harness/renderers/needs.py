@@ -63,6 +63,8 @@ def _all_reasons(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
             yield Capability.PRIORITY, f"solid {solid.name!r} touches or overlaps {other!r}"
         if any(scene.media[solid.medium].absorption):
             yield Capability.ABSORPTION, f"solid {solid.name!r} absorbs"
+        if scene.media[solid.medium].abbe is not None:
+            yield Capability.DISPERSION, f"solid {solid.name!r} is to disperse light"
         if scene.transport.reflection:
             yield Capability.FRESNEL, f"solid {solid.name!r} reflects a part"
     for surface in scene.surfaces:

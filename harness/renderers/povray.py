@@ -183,6 +183,8 @@ class StockPovRayRenderer(PovRayRenderer):
 
     name = "povray-stock"
     translate = staticmethod(translate_stock)
+    # As users have it, who let solids touch: what comes of that is documented where it is asked.
+    capabilities = PovRayRenderer.capabilities | {Capability.PRIORITY, Capability.DISPERSION}
 
 
 def _write(translated: PovScene, scene: rs.ResolvedScene, folder: Path) -> Path:

@@ -15,7 +15,7 @@ from harness.scene import resolved
 from harness.scene.resolved import ResolvedScene
 
 # All but RADIANCE_N2: radiance is not scaled with the square of the index, as in POV-Ray.
-CAPABILITIES = frozenset(Capability) - {Capability.RADIANCE_N2}
+CAPABILITIES = frozenset(Capability) - {Capability.RADIANCE_N2, Capability.DISPERSION}
 
 
 FAR = 1e30  # instead of infinity, which no image file should hold

@@ -45,6 +45,7 @@ def cross_findings(document: Table, renderers: Collection[str] = ()) -> list[Fin
     return [
         *_repeated_names(document),
         *_media(document),
+        *_dispersion(document),
         *_variants(document),
         *_checks(document, registered_renderers().union(renderers)),
     ]
@@ -116,6 +117,17 @@ def _index(path: KeyPath, medium: Table) -> Iterator[Finding]:
     elif len(said) > 1:
         expected = f"either {said[0]} or {said[1]}"
         yield Finding((*path, said[1]), "the index is said twice", None, expected)
+
+
+def _dispersion(document: Table) -> Iterator[Finding]:
+    """Whether there is a truth where renderers disperse by themselves: in a furnace alone."""
+    if _table(document, "transport").get("dispersion") is not True:
+        return
+    for key in ("spectrum", "surfaces", "lights", "probes"):
+        if document.get(key):
+            message = "has no truth where renderers disperse by themselves"
+            expected = "solids before a background, or no transport.dispersion"
+            yield Finding((key,), message, None, expected)
 
 
 def _variants(document: Table) -> Iterator[Finding]:

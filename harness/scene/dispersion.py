@@ -58,6 +58,17 @@ def index(medium: model.Medium, wavelength: float, air: float) -> float:
     return relative * air
 
 
+def abbe_number(medium: model.Medium, wavelength: float, air: model.Medium) -> float | None:
+    """(n - 1) / (nF - nC), n at `wavelength` nm; None where the medium does not disperse.
+
+    Raises SceneInvalid where the medium has no index at one of the lines.
+    """
+    n, n_F, n_C = (
+        index(medium, line, index(air, line, 1.0)) for line in (wavelength, LINE_F, LINE_C)
+    )
+    return (n - 1) / (n_F - n_C) if n_F != n_C else None
+
+
 def _relative(medium: model.Medium, wavelength: float) -> float:
     if medium.glass is not None:
         return _sellmeier(GLASSES[medium.glass], wavelength)

@@ -203,6 +203,9 @@ class Film(Strict):
 class Transport(Strict):
     max_depth: Annotated[int, Field(ge=1, le=10000)] = 40
     min_weight: Annotated[float, Field(ge=0, lt=1)] = 1e-6
+    dispersion: Annotated[
+        bool, Field(description="whether renderers are to render all wavelengths at once")
+    ] = False
 
 
 class Probe(Strict):

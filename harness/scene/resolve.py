@@ -7,7 +7,7 @@ from pathlib import Path
 
 from harness.scene import model, resolved
 from harness.scene.crosscheck import AIR
-from harness.scene.dispersion import index, wavelengths
+from harness.scene.dispersion import abbe_number, index, wavelengths
 from harness.scene.findings import Attempts, Finding, SceneInvalid, input_error, quoted
 from harness.scene.load import LoadedCase
 from harness.scene.nesting import nested
@@ -114,8 +114,14 @@ def _media(
     }
     attempts.raise_any()
     iors[AIR] = air
+    abbe = {
+        name: abbe_number(medium, wavelength, defined[AIR]) if case.transport.dispersion else None
+        for name, medium in defined.items()
+    }
     media = tuple(
-        resolved.Medium(name=name, ior=iors[name] or 1.0, absorption=medium.absorption)
+        resolved.Medium(
+            name=name, ior=iors[name] or 1.0, absorption=medium.absorption, abbe=abbe[name]
+        )
         for name, medium in defined.items()
     )
     return media, {name: k for k, name in enumerate(defined)}

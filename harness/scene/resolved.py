@@ -283,11 +283,16 @@ Material = Annotated[
 
 
 class Medium(Frozen):
-    """`absorption` is Napierian, per scene unit and colour channel: T = exp(-absorption L)."""
+    """`absorption` is Napierian, per scene unit and colour channel: T = exp(-absorption L).
+
+    `ior` holds at all wavelengths, but where there is an Abbe number `abbe`, (n - 1) / (nF - nC):
+    there it is the index at the scene's wavelength, and a renderer disperses light by itself.
+    """
 
     name: str
     ior: float
     absorption: Rgb = (0.0, 0.0, 0.0)
+    abbe: float | None = None
 
 
 class Solid(Frozen):

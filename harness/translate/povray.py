@@ -166,14 +166,18 @@ class Writer:
     # --- solids ---------------------------------------------------------------------------------
 
     def _solid(self, solid: rs.Solid) -> str:
+        interior = f"interior {{ {self.interior(solid)} }}"
+        return shape_text(solid.shape, self._dielectric(), interior, "hollow", solid=True)
+
+    def interior(self, solid: rs.Solid) -> str:
+        """What a solid is filled with."""
         media = self.scene.media
         ior = media[solid.medium].ior / media[0].ior
         # POV-Ray adds up the absorption of all solids that a ray is in, and of the atmosphere.
         inner, outer = media[solid.medium].absorption, media[solid.exterior].absorption
         more = [i - o for i, o in zip(inner, outer, strict=True)]
         absorption = f" {self.absorption(more)}" if any(more) else ""
-        interior = f"interior {{ ior {number(ior)}{absorption} }}"
-        return shape_text(solid.shape, self._dielectric(), interior, "hollow", solid=True)
+        return f"ior {number(ior)}{absorption}"
 
     def _dielectric(self) -> str:
         transport = self.scene.transport

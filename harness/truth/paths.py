@@ -67,13 +67,15 @@ class Landing:
 @dataclass(frozen=True)
 class Boundary:
     """The next boundary on each of m rays: distance `t` (infinite where there is none), normal `n`
-    facing the ray, index `which` of its solid, and the medium `beyond` it.
+    facing the ray, and the medium `beyond` it. `before` and `behind` it, both (solids, m), the ray
+    is in these solids: they differ in more than one where solids share a face.
     """
 
     t: Float
     n: Float
-    which: NDArray[np.intp]
     beyond: NDArray[np.intp]
+    before: NDArray[np.bool_]
+    behind: NDArray[np.bool_]
 
 
 class ClosedForm:
@@ -201,14 +203,17 @@ class ClosedForm:
         rows = np.arange(len(o))
         if self._meeting:
             inside = inside.copy()
-            t, n, which, at_once = self._visible_interface(o, d, inside)
-            beyond = self._filling(inside ^ at_once)
+            t, n, _, at_once = self._visible_interface(o, d, inside)
+            behind = inside ^ at_once
+            beyond = self._filling(behind)
         else:
             t, n, which = _next_interface([body.chords(o, d) for body in self._bodies], inside)
             leaving = inside[which, rows] if self._bodies else np.zeros(len(o), bool)
-            beyond = _beyond(self._bodies, which, leaving)
+            beyond, behind = _beyond(self._bodies, which, leaving), inside.copy()
+            if self._bodies:
+                behind[which, rows] ^= True
         facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
-        return Boundary(t, facing, which, beyond)
+        return Boundary(t, facing, beyond, inside, behind)
 
     def _visible_interface(
         self, o: Float, d: Float, inside: NDArray[np.bool_]

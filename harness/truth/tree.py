@@ -105,7 +105,10 @@ def branches(
         goes_on = np.isfinite(met.t)
         if len(front.path) + 1 >= depth or not goes_on.any():
             continue
-        met = Boundary(met.t[goes_on], met.n[goes_on], met.which[goes_on], met.beyond[goes_on])
+        met = Boundary(
+            met.t[goes_on], met.n[goes_on], met.beyond[goes_on],
+            met.before[:, goes_on], met.behind[:, goes_on],
+        )  # fmt: skip
         for child in _split(form, front.take(goes_on), met, partial):
             child = child.take(child.weight > min_weight) if min_weight else child
             if len(child.rows) and (along is None or along.startswith(child.path)):
@@ -127,9 +130,7 @@ def _split(form: ClosedForm, front: _Front, met: Boundary, partial: bool) -> tup
     everyone = np.full(len(o), partial)
 
     def child(letter: str, d: Float, weight: Float, amplitude: Complex, crosses: bool) -> _Front:
-        inside = front.inside.copy()
-        if crosses:
-            inside[met.which, np.arange(len(o))] ^= True
+        inside = met.behind if crosses else met.before
         field = _turned(front.field, front.d, d, met.n, amplitude)
         medium = met.beyond if crosses else front.medium
         return _Front(

@@ -318,13 +318,15 @@ def test_stored_results_stand_in_for_a_missing_renderer(
         lambda: {name: REGISTERED[name] for name in ("student", "tracer")},
     )
     result = work("run", "slab", "ball", "--scenes", SCENES, "--out", "out")
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == 3, result.output  # it was asked for, and did not run
     assert "stored results of 1.0" in result.output.replace("\n", " ")
     summary = record.read_summary(Path("out") / "summary.json")
     assert summary.renderers["student"].status == "stored"
-    mine = checks_of(summary, "student")
-    assert {check.status for check in mine} == {Verdict.PASS}
+    mine = [check for check in checks_of(summary, "student") if check.against == "truth"]
+    assert {check.status for check in mine} == {Verdict.SKIP}  # what is not measured is no pass
     assert all(check.stored == ["student"] for check in mine)
+    assert all("it was pass then" in check.reason for check in mine)
+    assert all(check.value is not None for check in mine)
     pairs = [c for c in checks_of(summary) if {c.renderer, c.against} == {"student", "tracer"}]
     assert len(pairs) == 3  # its stored picture against the live one
     stored = next(
@@ -345,6 +347,26 @@ def test_who_asks_for_a_renderer_by_name_wants_it_live(
 ) -> None:
     monkeypatch.setitem(REGISTERED, "student", lambda: Absent(RendererMissing("gone"), "student"))
     assert run(work, "out", "student tracer") == 3
+
+
+def test_who_brings_a_renderer_can_do_without_the_others(
+    work: Invoke, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is stored of them is enough to hold one's own against; one's own must run."""
+    registry = "harness.renderers.registry"
+    gone = {"student": lambda: Absent(RendererMissing("gone"), "student")}
+    monkeypatch.setattr(f"{registry}.available", lambda: gone)
+    monkeypatch.setattr(f"{registry}.command_renderer", lambda _: student(name="mine"))
+    options = ("ball", "--scenes", SCENES, "--out", "out")
+    result = work("run", *options, "--renderer-command", "mine {scene} {output}")
+    assert result.exit_code == 0, result.output
+    checks = checks_of(record.read_summary(Path("out") / "summary.json"))
+    pairs = [check for check in checks if {check.renderer, check.against} == {"student", "mine"}]
+    assert {check.status for check in pairs} == {Verdict.PASS}
+    monkeypatch.setattr(f"{registry}.available", dict)
+    monkeypatch.setattr(f"{registry}.command_renderer", lambda _: gone["student"]())
+    result = work("run", *options, "--renderer-command", "student {scene} {output}")
+    assert result.exit_code == 3, result.output
 
 
 def test_a_live_run_wins(work: Invoke) -> None:

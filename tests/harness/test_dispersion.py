@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 import tracer.spectrum
+from harness.data import scenes_root
 from harness.errors import InputError
+from harness.renderers.base import Capability
+from harness.renderers.needs import needs
 from harness.scene import dispersion
 from harness.scene.load import load_cases
 from harness.scene.media_model import Abbe, Cauchy, Medium, Sellmeier
@@ -55,6 +58,21 @@ def test_a_glass_of_two_numbers_has_these() -> None:
     flint = dispersion.of_abbe(Abbe(nd=1.62004, vd=36.37))
     other = tracer.spectrum.from_abbe(1.62004, 36.37)
     assert pytest.approx((other.A, other.B), rel=1e-12) == (flint.A, flint.B)
+
+
+def test_only_who_is_to_disperse_is_told_how_strongly(tmp_path: Path) -> None:
+    """Schott gives N-BK7's Abbe number as 64.17; what does not disperse has none."""
+    file = tmp_path / "furnace" / "own.toml"
+    file.parent.mkdir()
+    text = (scenes_root() / "findings" / "dispersion-energy.toml").read_text()
+    file.write_text(text.replace('abbe = { nd = 1.7847, vd = "=vd" }', 'glass = "N-BK7"'))
+    scene = resolve(load_cases(file)[0])
+    assert [m.abbe for m in scene.media] == [None, pytest.approx(64.17, abs=0.005)]
+    assert Capability.DISPERSION in needs(scene)
+    file.write_text(file.read_text().replace("dispersion = true", ""))
+    alike = resolve(load_cases(file)[0])
+    assert [m.abbe for m in alike.media] == [None, None]
+    assert Capability.DISPERSION not in needs(alike)
 
 
 def test_formulas_are_those_of_the_textbook() -> None:

@@ -359,6 +359,12 @@ def test_a_name_used_twice_is_a_mistake(scene_file: Path) -> None:
     assert (one.line, one.key, one.message) == (35, "solids[1].name", "name used twice")
 
 
+def test_where_renderers_disperse_only_a_furnace_has_a_truth(scene_file: Path) -> None:
+    found = problems(scene_file, SCENE + "\n[transport]\ndispersion = true\n")
+    assert [p.key for p in found] == ["surfaces", "probes"]
+    assert {p.message for p in found} == {"has no truth where renderers disperse by themselves"}
+
+
 def test_a_permutations_mistake_is_said_once_with_its_parameters(scene_file: Path) -> None:
     text = SCENE.replace("radius = 1", 'radius = "=1 - r"')
     one = problem(scene_file, text + "\n[axes]\nr = [0.5, 1, 1.5]\n")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import re
 
+import pytest
+
 from harness.cli.options import chosen_renderers, named_by
 from harness.data import scenes_root
 from harness.plan import asks, prepare
@@ -37,6 +39,22 @@ def test_absorption_fades_as_beer_and_lambert_say() -> None:
     distance, color = float(found[1]), [float(c) for c in found[2].split(",")]
     for c, sigma in zip(color, absorption, strict=True):
         assert math.isclose((1 - c) / distance, sigma, rel_tol=1e-12)
+
+
+@pytest.mark.parametrize(("ior", "abbe"), [(1.5168, 64.17), (1.7847, 25.7)])
+def test_dispersion_spreads_the_lines_f_and_c_as_the_abbe_number_says(
+    ior: float, abbe: float
+) -> None:
+    """By POV-Ray's law, n(wavelength) = n dispersion^((555 - wavelength) / 350)."""
+    bare = scene((slab(0, -1), 1, 0), ior=(ior,))
+    assert "dispersion" not in translate_stock(bare).sdl
+    glass = bare.media[1].model_copy(update={"abbe": abbe})
+    sdl = translate_stock(bare.model_copy(update={"media": (bare.media[0], glass)})).sdl
+    found = re.search(r" dispersion (\S+)", sdl)
+    assert found is not None
+    n_f, n_c = (ior * float(found[1]) ** ((555 - line) / 350) for line in (486.1327, 656.2725))
+    # To first order in the spread of the indices.
+    assert math.isclose((ior - 1) / (n_f - n_c), abbe, rel_tol=(n_f - n_c) / ior)
 
 
 def test_lengths_are_the_scene_s_own() -> None:

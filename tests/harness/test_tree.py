@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.renderers.base import Rays, Status
+from harness.scene.order import placed
 from harness.scene.resolved import Sphere
 from harness.truth.paths import ClosedForm
 from harness.truth.tree import branches, light_around, light_on, natural_weight
@@ -53,6 +55,33 @@ def test_each_branch_is_the_path_followed_alone(ior: float, path: str) -> None:
             assert (alone.status[branch.rows] == Status.HIT).all()
             return
     assert (alone.status != Status.HIT).all()
+
+
+@pytest.mark.parametrize("iors", [(1.5, 1.333), (1.333, 1.5), (2.417, 1.0)])
+def test_slabs_that_share_a_face(iors: tuple[float, float]) -> None:
+    """Two layers by Stokes' sums: R = R_a + T_a^2 R_b / (1 - R_a R_b), T = T_a T_b / (1 - R_a R_b).
+
+    G. G. Stokes, On the intensity of the light reflected from or transmitted through a pile of
+    plates, Proc. R. Soc. 11, 545 (1862), for faces instead of plates. At normal incidence, where
+    R = ((n - m) / (n + m))^2 in all polarisations.
+    """
+    layers = scene((slab(0, -1), 1, 0), (slab(-1, -3), 2, 0), ior=iors)
+    form = ClosedForm(layers.model_copy(update={"solids": placed(layers.solids, (0, 0), 1e-9)}))
+    rays = fan(np.zeros(1))
+    assert {b.path for b in branches(form, rays, 4, partial=False)} == {"", "T", "TT", "TTT"}
+    behind, before = (light_on(form, rays, face(z), 40, 1e-9) for z in (-4.0, 2.0))
+    transmitted, reflected = 1.0, 0.0
+    for n, m in pairwise((1.0, *iors, 1.0)):
+        r = ((n - m) / (n + m)) ** 2
+        again = 1 - reflected * r
+        reflected, transmitted = (
+            reflected + transmitted**2 * r / again,
+            transmitted * (1 - r) / again,
+        )
+    for light, all_of_it in ((behind, transmitted), (before, reflected)):
+        missing = all_of_it - light.level[0, 0]
+        assert -64 * EPS <= missing <= light.cut[0] + 64 * EPS
+        assert light.cut[0] <= 1e-6
 
 
 def test_in_a_white_furnace_nothing_is_lost() -> None:

@@ -22,6 +22,7 @@ from harness.cli.options import (
     quality_option,
     renderer_option,
     scenes_option,
+    those_that_must_run,
 )
 from harness.cli.shards import divided
 
@@ -121,6 +122,7 @@ def command(
         cases = prepared_cases(case, quality, scenes, [r.name for r in chosen])
         if not renderers:
             chosen += named_by(cases)
+        must_run = those_that_must_run(chosen, renderers)
         if shard is not None:
             settings = f"{quality}, seed {seed}, stored {stored}"
             cases, note = divided(shard, cases, [r.name for r in chosen], settings, times, scenes)
@@ -133,7 +135,7 @@ def command(
                 cases, chosen, helper, out, quality=quality, seed=seed,
                 threads=place.threads(jobs or core_count()), timeout_s=timeout, memory_mb=memory,
                 report=progress, cache=cache,
-                command=" ".join(["snellcheck", *sys.argv[1:]]), must_run=renderers,
+                command=" ".join(["snellcheck", *sys.argv[1:]]), must_run=must_run,
                 stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
             )  # fmt: skip
     if cache is not None and cache.trouble:
