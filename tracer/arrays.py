@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracer.boxes import LINK, NODE
 from tracer.errors import SceneError
-from tracer.mesh import LEFT, RIGHT, WORDS, Mesh, Tree, grow_tree, require_closed
+from tracer.mesh import Mesh, require_closed
 from tracer.patterns import Constant, Pattern, Picture, pattern_row
 from tracer.scene import (
     Diffuse,
@@ -31,6 +32,7 @@ from tracer.scene import (
 from tracer.shapes import COLUMNS, HOLLOW, Disk, Quadric, Rectangle, Sphere, bound_row, face_row
 from tracer.shared import Bound, Surfaces
 from tracer.solids import Cell, Compound, compound_rows
+from tracer.tree import Tree, grow_tree, lined_up
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +64,7 @@ class Arrays(NamedTuple):
     texels: Floats
     lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
     background: Floats  # (1, 9): a pattern's row
-    nodes: NDArray[np.float32]  # of all meshes' trees
+    nodes: NDArray[np.uint8]  # of all meshes' trees
     links: NDArray[np.int32]  # the same memory
     triangles: Floats
     normals: Floats
@@ -173,7 +175,7 @@ class _Flattener:
                 kind, rows = DISK if isinstance(shape, Disk) else RECTANGLE, [face_row(shape)]
             case Mesh():
                 kind, first, count = MESH, self.nodes, self.triangles
-                normals = self._tree(grow_tree(shape))
+                normals = self._tree(grow_tree(shape.vertices, shape.triangles, shape.normals))
                 ball = _ball_around(shape.vertices)
         self.rows += rows
         self.objects.append([kind, first, count, material, *media, pattern, normals])
@@ -182,7 +184,7 @@ class _Flattener:
 
     def _tree(self, tree: Tree) -> int:
         """Moves a tree behind the ones that are there; returns the row of its first normal."""
-        children = tree.links[:, LEFT : RIGHT + 1]
+        children = tree.links[:, LINK:]
         children += np.where(children >= 0, self.nodes, -8 * self.triangles).astype(np.int32)
         first_normal = self.normals if len(tree.normals) else -1
         self.trees.append(tree)
@@ -286,7 +288,9 @@ def _flatten(scene: Scene) -> Arrays:
     around = scene.background
     background = into.pattern(around if isinstance(around, Picture) else Constant(around))
     trees = into.trees or [_NO_TREE]
-    nodes = np.concatenate([tree.nodes for tree in trees])
+    nodes = np.concatenate(
+        [tree.nodes for tree in trees], out=lined_up(sum(len(tree.nodes) for tree in trees))
+    )
     return Arrays(
         objects=np.array(into.objects, np.int64).reshape(-1, 8),
         balls=_table(into.balls, 4),
@@ -305,4 +309,4 @@ def _flatten(scene: Scene) -> Arrays:
     )
 
 
-_NO_TREE = Tree(np.empty((0, WORDS), np.float32), np.empty((0, 9)), np.empty((0, 9)))
+_NO_TREE = Tree(np.empty((0, NODE), np.uint8), np.empty((0, 9)), np.empty((0, 9)))

@@ -1,4 +1,4 @@
-"""Solids made of triangles, and the tree of boxes that finds the triangle a ray meets.
+"""Solids made of triangles, and which of them a ray meets.
 
 "Models must be complete: no holes! All faces (triangles) must be tagged to a solid." A mesh that
 bounds a medium is refused unless every edge joins exactly two triangles that agree on outside.
@@ -11,22 +11,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import called, compiled, inlined
+from tracer.boxes import LINK, WIDTH, first_bit, meets_boxes, prefetch
+from tracer.compiled import called, inlined
 from tracer.errors import SceneError
+from tracer.tree import HIGHEST
 from tracer.vector import Vec, add, cross, dot, normalise, scale, sub
 
 Floats = NDArray[np.float64]
-Boxes = NDArray[np.float32]
-Ints = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
 Ints32 = NDArray[np.int32]
-Indices = tuple[int, int, int]
 
 INF = np.inf
-LEAF = 4  # triangles at most in a leaf
-BINS = 16
-DEEP = 48  # below this level ranges are halved, which bounds the tree's height
-EMPTY_LEAF = -1
-STACK = 96  # > DEEP + log2 of any number of triangles that fits in memory
+BOTTOM = WIDTH // 2  # the rows of a stack below hold the distances to a node's boxes
+STACK = BOTTOM + HIGHEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,169 +79,6 @@ def require_closed(mesh: Mesh, name: str) -> None:
         raise SceneError(f"{name}: triangles must be counter-clockwise from outside")
 
 
-# --- building the tree ----------------------------------------------------------------------------
-# A node is 16 words of 4 bytes, one line of cache: the boxes of its two children in float32,
-# rounded outwards (least x, y, z, most x, y, z each), and as integers in columns LEFT and RIGHT
-# where they are: the row of another node, or as -1 - (8 first + count) a leaf's triangles.
-
-LEFT, RIGHT, WORDS = 12, 13, 16
-
-
-@inlined
-def _clear(box: Floats) -> None:
-    for k in range(3):
-        box[k], box[3 + k] = INF, -INF
-
-
-@inlined
-def _include(box: Floats, other: Floats) -> None:
-    for k in range(3):
-        if other[k] < box[k]:
-            box[k] = other[k]
-        if other[3 + k] > box[3 + k]:
-            box[3 + k] = other[3 + k]
-
-
-@inlined
-def _half_area(box: Floats) -> float:
-    x, y, z = box[3] - box[0], box[4] - box[1], box[5] - box[2]
-    return x * y + y * z + z * x if x >= 0.0 else 0.0
-
-
-@inlined
-def _middle(boxes: Floats, triangle: int, axis: int) -> float:
-    """Twice the middle of its box, to be exact."""
-    return float(boxes[triangle, axis] + boxes[triangle, 3 + axis])
-
-
-@called
-def _split(boxes: Floats, order: Ints, begin: int, end: int, bins: Floats, halve: bool) -> int:
-    """Sorts order[begin:end] into two parts of least surface area cost; where the second starts.
-
-    I. Wald, On fast construction of SAH-based bounding volume hierarchies, 2007.
-    """
-    axis, low, extent = 0, 0.0, 0.0
-    for k in range(3):
-        least, most = INF, -INF
-        for i in range(begin, end):
-            middle = _middle(boxes, order[i], k)
-            least, most = min(least, middle), max(most, middle)
-        if most - least > extent:
-            axis, low, extent = k, least, most - least
-    if halve or extent == 0.0:
-        return (begin + end) // 2
-
-    to_bin = BINS * (1.0 - 1e-9) / extent
-    for k in range(BINS):
-        _clear(bins[k])
-        bins[k, 6] = 0.0
-    for i in range(begin, end):
-        k = int((_middle(boxes, order[i], axis) - low) * to_bin)
-        bins[k, 6] += 1.0
-        _include(bins[k], boxes[order[i]])
-    best = _cheapest(bins)
-
-    i, j = begin, end - 1
-    while i <= j:
-        triangle = order[i]
-        if int((_middle(boxes, triangle, axis) - low) * to_bin) < best:
-            i += 1
-        else:
-            order[i], order[j] = order[j], triangle
-            j -= 1
-    return i
-
-
-@called
-def _cheapest(bins: Floats) -> int:
-    """The bin before which to split. Columns of `bins`: box, count, cost; one row is scratch."""
-    around = bins[BINS]
-    for backwards in range(2):
-        _clear(around)
-        n = 0.0
-        for step in range(1, BINS):
-            k = BINS - step if backwards else step - 1
-            n += bins[k, 6]
-            _include(around, bins[k])
-            cost = n * _half_area(around)
-            if backwards:
-                bins[k, 7] += cost
-            else:
-                bins[k + 1, 7] = cost
-    best = 1
-    for k in range(2, BINS):
-        if bins[k, 7] < bins[best, 7]:
-            best = k
-    return best
-
-
-@compiled
-def _build(boxes: Floats, order: Ints, nodes: Floats, tasks: Ints, bins: Floats) -> int:
-    """Sorts triangles with bounding `boxes` (T, 6) into a tree; the number of its nodes.
-
-    Fills `order` (T,) and the first `nodes` (T, 16), not yet packed. The rest is scratch: `tasks`
-    (2 STACK, 4) and `bins` (BINS + 1, 8).
-    """
-    total = len(boxes)
-    for i in range(total):
-        order[i] = i
-    count, waiting = 1, 1
-    tasks[0, 0], tasks[0, 1], tasks[0, 2], tasks[0, 3] = 0, 0, total, 0
-    while waiting > 0:
-        waiting -= 1
-        node, begin = tasks[waiting, 0], tasks[waiting, 1]
-        end, level = tasks[waiting, 2], tasks[waiting, 3]
-        middle = end
-        if total > LEAF:
-            middle = _split(boxes, order, begin, end, bins, level >= DEEP)
-        for side in range(2):
-            first, last = (begin, middle) if side == 0 else (middle, end)
-            box = nodes[node, 6 * side : 6 * side + 6]
-            _clear(box)
-            for i in range(first, last):
-                _include(box, boxes[order[i]])
-            if last - first <= LEAF:
-                nodes[node, LEFT + side] = -1 - (8 * first + (last - first))
-                continue
-            nodes[node, LEFT + side] = count
-            tasks[waiting, 0], tasks[waiting, 1] = count, first
-            tasks[waiting, 2], tasks[waiting, 3] = last, level + 1
-            count += 1
-            waiting += 1
-    return count
-
-
-@dataclass(frozen=True, eq=False)
-class Tree:
-    """What the kernels read: nodes, and triangles in the order of the tree's leaves."""
-
-    nodes: NDArray[np.float32]  # (N, 16)
-    triangles: Floats  # (T, 9): three vertices each
-    normals: Floats  # (T, 9) or (0, 9)
-
-    @property
-    def links(self) -> NDArray[np.int32]:
-        """The same memory as `nodes`, read as integers."""
-        return self.nodes.view(np.int32)
-
-
-def grow_tree(mesh: Mesh) -> Tree:
-    """A tree over the triangles of a mesh, in about a microsecond per triangle."""
-    corners = mesh.vertices[mesh.triangles]
-    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    total = len(boxes)
-    order, nodes = np.empty(total, np.int64), np.empty((total, WORDS))
-    count = _build(boxes, order, nodes, np.empty((2 * STACK, 4), np.int64), np.empty((BINS + 1, 8)))
-    packed = np.zeros((count, WORDS), np.float32)
-    outwards = np.repeat(np.array([-INF, INF, -INF, INF], np.float32), 3)
-    packed[:, :LEFT] = np.nextafter(nodes[:count, :LEFT].astype(np.float32), outwards)
-    packed.view(np.int32)[:, LEFT : RIGHT + 1] = nodes[:count, LEFT : RIGHT + 1]
-    normals = np.empty((0, 9))
-    if mesh.normals is not None:
-        normals = mesh.normals[mesh.triangles[order]].reshape(-1, 9)
-    return Tree(packed, corners[order].reshape(-1, 9), normals)
-
-
 # --- tracing --------------------------------------------------------------------------------------
 
 
@@ -281,30 +115,18 @@ def triangle_distance(
 
 
 @inlined
-def _box_distance(
-    o: Vec, inverse: Vec, near: Indices, far: Indices, nodes: Boxes, node: int, at: int, best: float
-) -> float:
-    """Where the ray enters the box at column `at` of a node; infinite where it does not.
-
-    `near` and `far` tell which of its six faces the ray meets first and last along each axis. A
-    face in whose plane the ray lies gives 0/0, NaN, which loses both comparisons.
-    """
-    enter, leave = 0.0, best
-    for k in range(3):
-        first = (nodes[node, at + near[k]] - o[k]) * inverse[k]
-        last = (nodes[node, at + far[k]] - o[k]) * inverse[k]
-        if first > enter:
-            enter = first
-        if last < leave:
-            leave = last
-    return enter if enter <= leave else INF
+def _inverse(x: float) -> float:
+    """1 / x, but finite: what is in a box's plane up to rounding counts as in the box."""
+    if abs(x) < 1e-18:
+        x = 1e-18 if x >= 0.0 else -1e-18
+    return 1.0 / x
 
 
 @called
 def mesh_hit(
     o: Vec,
     d: Vec,
-    nodes: Boxes,
+    nodes: Bytes,
     links: Ints32,
     triangles: Floats,
     root: int,
@@ -324,33 +146,53 @@ def mesh_hit(
         side = 0
     else:
         t_min = -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
-    inverse = (1.0 / d[0], 1.0 / d[1], 1.0 / d[2])
-    near = (0 if d[0] >= 0.0 else 3, 1 if d[1] >= 0.0 else 4, 2 if d[2] >= 0.0 else 5)
-    far = (3 - near[0], 5 - near[1], 7 - near[2])
-    height, node = 0, root
-    while True:
-        while node >= 0:
-            t0 = _box_distance(o, inverse, near, far, nodes, node, 0, best)
-            t1 = _box_distance(o, inverse, near, far, nodes, node, 6, best)
-            first, second = links[node, LEFT], links[node, RIGHT]
-            if t1 < t0:
-                t0, t1, first, second = t1, t0, second, first
-            if t1 < INF:
-                stack[height, 0], stack[height, 1] = t1, second
-                height += 1
-            node = first if t0 < INF else EMPTY_LEAF
+    inverses = (_inverse(d[0]), _inverse(d[1]), _inverse(d[2]))
+    height = _begun(root, stack)
+    while height > BOTTOM:
+        height -= 1
+        if stack[height, 0] > best:
+            continue
+        node = int(stack[height, 1])
+        if node >= 0:
+            met = meets_boxes(nodes, node, o, inverses, best, stack)
+            height = _push(met, node, links, nodes, triangles, stack, height)
+            continue
         leaf = -1 - node
         for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
             if triangle != on_face:
                 t, from_side = triangle_distance(o, d, triangles, triangle, side, t_min, best)
                 if from_side != 0:
                     best, hit, hit_side = t, triangle, from_side
-        while height > 0 and stack[height - 1, 0] > best:
-            height -= 1
-        if height == 0:
-            return best, hit, hit_side
-        height -= 1
-        node = int(stack[height, 1])
+    return best, hit, hit_side
+
+
+@inlined
+def _begun(root: int, stack: Floats) -> int:
+    stack[BOTTOM, 0], stack[BOTTOM, 1] = 0.0, root
+    return BOTTOM + 1
+
+
+@inlined
+def _push(
+    met: int, node: int, links: Ints32, nodes: Bytes, triangles: Floats, stack: Floats, height: int
+) -> int:
+    """Puts the children that are met on the stack, the nearest on top; the stack's height."""
+    bottom = height
+    while met != 0:
+        k = first_bit(met)
+        met &= met - 1
+        t, child = stack[k // 2, k % 2], links[node, LINK + k]
+        if child >= 0:
+            prefetch(nodes, child)
+        else:
+            prefetch(triangles, (-1 - child) >> 3)
+        at = height
+        while at > bottom and stack[at - 1, 0] < t:
+            stack[at, 0], stack[at, 1] = stack[at - 1, 0], stack[at - 1, 1]
+            at -= 1
+        stack[at, 0], stack[at, 1] = t, child
+        height += 1
+    return height
 
 
 @inlined
