@@ -100,6 +100,7 @@ def test_every_mode_has_its_panes(page: Page, run: Path) -> None:
         "Signed": ["(A − B) / max(|A|, |B|) of A student and B tracer"],
         "SSIM": ["1 − SSIM of A student and B tracer"],
         "ΔE": ["ΔE₀₀ of A student and B tracer"],
+        "FLIP": ["FLIP of A student and B tracer"],
     }
     for label, wanted in expected.items():
         page.get_by_role("button", name=label, exact=True).click()

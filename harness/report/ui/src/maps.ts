@@ -1,6 +1,7 @@
 // The modes that show a figure per pixel: what it is, in which unit, on which scale.
 
 import type { Scale } from "./colour";
+import { flip } from "./flip";
 import { deltaE, difference, dissimilarity, relative } from "./metrics";
 import type { Image } from "./pack";
 import type { Mode } from "./state";
@@ -35,6 +36,12 @@ export const MAPS: Partial<Record<Mode, MapMode>> = {
     unit: "",
     scale: (exposure) => ({ colours: "inferno", low: 0, high: 10 * 2 ** -exposure, log: false }),
     figures: deltaE,
+  },
+  flip: {
+    title: "FLIP",
+    unit: "",
+    scale: (exposure) => ({ colours: "inferno", low: 0, high: 2 ** -exposure, log: false }),
+    figures: flip,
   },
   rays: { title: "ray error", unit: "µrad", scale: up(1e5, 9), figures: null },
 };

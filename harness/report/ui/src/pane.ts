@@ -3,9 +3,21 @@
 import { h } from "./dom";
 import type { Camera, Pixel } from "./state";
 
-/** Shaded pixels, ready to be drawn. `text` writes a pixel's figures where there is room. */
+/** Where a picture's upper left corner is on a canvas of this size, and how large its pixels are. */
+export interface View {
+  readonly left: number;
+  readonly top: number;
+  readonly scale: number;
+  readonly width: number;
+  readonly height: number;
+}
+
+/**
+ * A picture or map. `paint` draws it, stretched to `width` by `height` of its pane's pixels, which
+ * `view` places; `text` gives a pixel's figures, to be written where there is room.
+ */
 export interface Sheet {
-  readonly canvas: HTMLCanvasElement;
+  readonly paint: (context: CanvasRenderingContext2D, view: View, width: number, height: number) => void;
   readonly text: (x: number, y: number) => readonly string[];
 }
 
@@ -83,8 +95,7 @@ export class Pane {
       context.rect(layer.from * width, 0, width, height);
       context.clip();
       context.clearRect(layer.from * width, 0, width, height);
-      const { canvas } = layer.sheet;
-      context.drawImage(canvas, left, top, this.size.width * scale, this.size.height * scale);
+      layer.sheet.paint(context, { left, top, scale, width, height }, this.size.width, this.size.height);
       if (camera.scale >= ROOM_FOR_TEXT) this.write(context, layer.sheet, left, top, scale, ratio);
       context.restore();
       if (layer.from > 0) this.line(context, layer.from * width, ratio);

@@ -1,38 +1,112 @@
-// Shaded pixels, kept until what they show changes.
+// Pictures and maps, ready to be drawn under a camera. What has been shaded is kept until what it
+// shows changes. Of large pictures no more is shaded than is seen: from afar a smaller one, from
+// near the part in view. Why not on the graphics card: docs/decisions/0014-the-pages-script.md.
 
 import { type Encoding, type Scale, shadeFigures, shadeRadiance } from "./colour";
 import { h } from "./dom";
 import { number } from "./format";
 import type { Image } from "./pack";
-import type { Sheet } from "./pane";
+import type { Sheet, View } from "./pane";
+import { cropped, halved, mean, type Part, type Planes, worst } from "./pyramid";
+
+const LARGE = 512 * 512; // pixels; what is smaller is shaded as a whole, and then moves for nothing
+
+interface Source {
+  readonly id: string;
+  readonly how: string; // what is shaded differs where this does
+  readonly planes: Planes;
+  readonly light: boolean; // may be averaged; of figures none may be lost
+  readonly shade: (data: Float32Array, out: Uint8ClampedArray) => void;
+}
 
 export class Sheets {
-  private readonly known = new Map<string, { key: string; sheet: Sheet }>();
+  private readonly known = new Map<string, { key: string; canvas: HTMLCanvasElement }>();
+  private readonly smaller = new Map<Float32Array, Planes>();
 
   picture(image: Image, exposure: number, encoding: Encoding): Sheet {
-    const count = image.width * image.height;
-    return this.sheet(`picture ${image.name}`, `${exposure} ${encoding}`, image.width, image.height,
-      (out) => shadeRadiance(image.planes, exposure, encoding, out),
-      (x, y) => [0, 1, 2].map((c) =>
-        number(image.planes[c * count + y * image.width + x] as number, 3)));
+    const { planes: data, width, height } = image;
+    const count = width * height;
+    return this.sheet({
+      id: `picture ${image.name}`, how: `${exposure} ${encoding}`, planes: { data, width, height },
+      light: true, shade: (some, out) => shadeRadiance(some, exposure, encoding, out),
+    }, (x, y) => [0, 1, 2].map((c) => number(data[c * count + y * width + x] as number, 3)));
   }
 
   figures(id: string, figures: Float32Array, width: number, height: number, scale: Scale): Sheet {
-    return this.sheet(id, `${scale.low} ${scale.high}`, width, height,
-      (out) => shadeFigures(figures, scale, out),
-      (x, y) => [number(figures[y * width + x] as number, 3)]);
+    return this.sheet({
+      id, how: `${scale.low} ${scale.high}`, planes: { data: figures, width, height },
+      light: false, shade: (some, out) => shadeFigures(some, scale, out),
+    }, (x, y) => [number(figures[y * width + x] as number, 3)]);
   }
 
-  private sheet(id: string, key: string, width: number, height: number,
-    shade: (out: Uint8ClampedArray) => void, text: Sheet["text"]): Sheet {
-    const known = this.known.get(id);
-    if (known?.key === key) return known.sheet;
-    const canvas = known?.sheet.canvas ?? h("canvas", { width, height });
-    const pixels = new ImageData(width, height);
-    shade(pixels.data);
-    canvas.getContext("2d")?.putImageData(pixels, 0, 0);
-    const sheet = { canvas, text };
-    this.known.set(id, { key, sheet });
-    return sheet;
+  private sheet(source: Source, text: Sheet["text"]): Sheet {
+    return {
+      text,
+      paint: (context, view, width, height) => {
+        const { planes } = source;
+        const [across, down] = [(width / planes.width) * view.scale, (height / planes.height) * view.scale];
+        const { level, factor } = this.level(source, Math.max(across, down));
+        const part = inView(level, view, across * factor, down * factor);
+        if (!part) return;
+        const canvas = this.shaded(source, level, part);
+        if (!source.light) context.imageSmoothingEnabled = false;
+        // The last cells of a smaller one may reach beyond the picture; that much is left out.
+        const [right, bottom] = [
+          Math.min(part.x + part.width, planes.width / factor) - part.x,
+          Math.min(part.y + part.height, planes.height / factor) - part.y,
+        ];
+        context.drawImage(canvas, 0, 0, right, bottom,
+          view.left + part.x * across * factor, view.top + part.y * down * factor,
+          right * across * factor, bottom * down * factor);
+      },
+    };
   }
+
+  /**
+   * Of a large picture the smallest form that has a pixel for each of the screen's, of any map one
+   * that has no more.
+   */
+  private level({ planes, light }: Source, scale: number): { level: Planes; factor: number } {
+    let [level, factor] = [planes, 1];
+    const pool = light ? mean : worst;
+    const wanted = (): boolean => light
+      ? level.width * level.height > LARGE && scale * factor <= 0.5
+      : level.width * level.height > 1 && scale * factor < 1;
+    while (wanted()) {
+      let next = this.smaller.get(level.data);
+      if (!next) this.smaller.set(level.data, (next = halved(level, pool)));
+      [level, factor] = [next, 2 * factor];
+    }
+    return { level, factor };
+  }
+
+  private shaded({ id, how, shade }: Source, level: Planes, part: Part): HTMLCanvasElement {
+    const key = [how, level.width, part.x, part.y, part.width, part.height].join();
+    const known = this.known.get(id);
+    if (known?.key === key) return known.canvas;
+    const { width, height } = part;
+    const canvas = known?.canvas ?? h("canvas", {});
+    if (canvas.width !== width) canvas.width = width;
+    if (canvas.height !== height) canvas.height = height;
+    const whole = width === level.width && height === level.height;
+    const pixels = new ImageData(width, height);
+    shade((whole ? level : cropped(level, part)).data, pixels.data);
+    canvas.getContext("2d")?.putImageData(pixels, 0, 0);
+    this.known.set(id, { key, canvas });
+    return canvas;
+  }
+}
+
+/** The part of a picture that a view shows, all of one that is not large; null where none is. */
+function inView(level: Planes, view: View, across: number, down: number): Part | null {
+  const { width, height } = level;
+  if (width * height <= LARGE) return { x: 0, y: 0, width, height };
+  const x = Math.max(0, Math.floor(-view.left / across));
+  const y = Math.max(0, Math.floor(-view.top / down));
+  const part = {
+    x, y,
+    width: Math.min(width, Math.ceil((view.width - view.left) / across)) - x,
+    height: Math.min(height, Math.ceil((view.height - view.top) / down)) - y,
+  };
+  return part.width > 0 && part.height > 0 ? part : null;
 }

@@ -12,6 +12,7 @@ export const MODES = {
   relative: { label: "Signed", key: "", hint: "(A − B) / max(|A|, |B|)" },
   ssim: { label: "SSIM", key: "", hint: "1 − structural similarity" },
   deltae: { label: "ΔE", key: "", hint: "colour difference CIEDE2000" },
+  flip: { label: "FLIP", key: "", hint: "what one notices who flips between A and B at 67 pixels per degree" },
   rays: { label: "Ray error", key: "y", hint: "angle between measured and true ray" },
 } as const;
 

@@ -1,0 +1,152 @@
+"""What the viewer makes of pictures that are given: FLIP, and pictures larger than the screen."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+pytest.importorskip("playwright.sync_api", reason="uv pip install playwright")
+
+from playwright.sync_api import Page
+
+from harness.record import CaseRecord, Verdict
+from harness.report import pack, write_report
+from harness.report.colours import NOT_FINITE, SCALE
+from harness.report.links import page_name
+from harness.report.pictures import display
+from tests.harness.report_fixture import summary_of, write_run
+from tests.harness.test_viewer_browser import colours_of
+
+pytestmark = pytest.mark.browser
+
+FLIP = Path(__file__).parents[1] / "data" / "flip" / "map.json"
+Pixels = NDArray[np.float32]
+
+
+def page_of(root: Path, pictures: Mapping[str, Pixels]) -> str:
+    """The address of a case's page with these pictures."""
+    images: list[pack.Image] = []
+    for name, pixels in pictures.items():
+        images.append(pack.image(name, "image", pixels, images[0] if images else None))
+    pack.write(root / "data" / "given.js", "given", images)
+    record = CaseRecord(
+        id="given", case="given", family="given", title="Given", scene_sha256="0" * 64,
+        scene_file="given/given.toml", quality="draft", snellcheck_version="0.1.0",
+        started="2026-01-02T03:04:05+00:00", wall_s=1, status=Verdict.SKIP, runs=[], checks=[],
+        pack="data/given.js",
+    )  # fmt: skip
+    write_report(write_run(root, [record], summary_of([record])))
+    return (root / "cases" / page_name("given")).as_uri()
+
+
+def open_page(page: Page, address: str) -> None:
+    page.goto("about:blank")
+    page.goto(address)
+    page.wait_for_selector("#viewer[data-ready]")
+    page.wait_for_timeout(100)  # the frame after
+
+
+def shown_at(page: Page, *steps: int) -> NDArray[np.int64]:
+    """The colours of the first pane's canvas so many of its pixels to the right of its middle."""
+    found = page.evaluate(
+        """steps => { const c = document.querySelector('.pane canvas');
+        const { data } = c.getContext('2d').getImageData(0, c.height / 2, c.width, 1);
+        return steps.map((x) => [...data.slice(4 * (c.width / 2 + x), 4 * (c.width / 2 + x) + 3)]);
+        }""",
+        list(steps),
+    )
+    return np.array(found)
+
+
+# --- FLIP -----------------------------------------------------------------------------------------
+
+
+def flipped() -> tuple[Pixels, Pixels]:
+    """Two pictures of closed form: one shifted in part, tinted, with two odd pixels, and darker."""
+    y, x = np.mgrid[0:36, 0:48]
+    checks = ((x // 6 + y // 6) % 2) * 0.8 + 0.1
+    a = np.stack([0.5 + 0.4 * np.sin(x / 5), 0.5 + 0.4 * np.cos(y / 4), checks], -1)
+    b = a.copy()
+    b[8:20, 10:26] = np.roll(a, 1, axis=1)[8:20, 10:26]
+    b[..., 0] *= 1 + 0.05 * np.sin(y / 9)
+    b[25, 30] = 1
+    b[30, 5] = 0
+    b[:, 40:] = 1.5 * b[:, 40:] ** 2
+    return a.astype(np.float32), b.astype(np.float32)
+
+
+def test_flip_is_what_its_authors_program_says(page: Page, tmp_path: Path) -> None:
+    """The matrices of Rec. 709 agree to five digits: colours, of size 100, to 1e-3.
+
+    Of a distance of 1e-3 equation 8 makes 0.95 / 16.5 * 1e-3 ** 0.7 = 5e-4.
+    """
+    told = json.loads(FLIP.read_text("utf-8"))
+    a, b = flipped()
+    open_page(page, page_of(tmp_path, {"tracer": a, "povray": b}))
+    shown = np.array(page.evaluate("window.snellcheckMaps('tracer', 'povray').flip"))
+    assert np.abs(shown - told["map"]).max() < 5e-4
+    assert shown.max() > 0.5
+    assert shown.mean() == pytest.approx(told["mean"], abs=1e-4)
+    same = page.evaluate("window.snellcheckMaps('tracer', 'tracer').flip")
+    assert set(same) == {0}
+    page.get_by_role("button", name="FLIP", exact=True).click()
+    page.wait_for_timeout(100)
+    assert len(colours_of(page)) > 20
+
+
+def test_flip_knows_no_answer_where_there_is_no_number(page: Page, tmp_path: Path) -> None:
+    a, b = flipped()
+    b[10, 20] = np.nan
+    open_page(page, page_of(tmp_path, {"tracer": a, "povray": b}))
+    shown = page.evaluate("window.snellcheckMaps('tracer', 'povray').flip.map(Number.isNaN)")
+    assert np.array(shown).reshape(36, 48)[10, 20]
+
+
+# --- large pictures -------------------------------------------------------------------------------
+
+WIDE, HIGH = 1501, 901
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Pictures of odd sides that differ in one pixel, and in one that is not a number."""
+    y, x = np.mgrid[0:HIGH, 0:WIDE]
+    one = np.stack([x / WIDE, y / HIGH, 0.2 + 0.5 * ((x // 50 + y // 50) % 2)], -1)
+    other = one.astype(np.float32)
+    other[333, 777] += 1.0
+    other[700, 200] = np.nan
+    root = tmp_path_factory.mktemp("large")
+    return page_of(root, {"tracer": one.astype(np.float32), "povray": other})
+
+
+def test_seen_from_afar_one_wrong_pixel_is_not_lost(page: Page, large: str) -> None:
+    open_page(page, f"{large}#mode=diff&every=0")
+    colours = colours_of(page)
+    assert list(NOT_FINITE) in colours
+    assert list(SCALE[-1]) in colours  # 1, where the scale ends
+    assert list(SCALE[0]) in colours
+
+
+def test_seen_from_afar_light_is_averaged(page: Page, large: str) -> None:
+    """At a quarter of the size: within 2 of 255 of the mean of what is there, away from edges."""
+    open_page(page, f"{large}#mode=a&a=tracer&view=725,475,0.25")
+    there = np.array([[[725 / WIDE, 475 / HIGH, 0.2 + 0.5 * ((14 + 9) % 2)]]])
+    assert np.abs(shown_at(page, 0)[0] - display(there)[0, 0].astype(int)).max() <= 2
+
+
+def test_seen_from_near_each_pixel_is_itself(page: Page, large: str) -> None:
+    open_page(page, f"{large}#mode=a&a=povray&ev=0.5&view=777.5,333.5,16")
+    odd, beside = shown_at(page, 0, 16)
+    assert odd.tolist() == [255, 255, 255]
+    there = np.array([[[778 / WIDE, 333 / HIGH, 0.2 + 0.5 * ((15 + 6) % 2)]]]) * np.sqrt(2)
+    assert np.abs(beside - display(there)[0, 0].astype(int)).max() <= 1
+
+
+def test_beside_a_large_picture_there_is_nothing(page: Page, large: str) -> None:
+    open_page(page, f"{large}#mode=a&a=tracer&view=-3000,-3000,4")
+    assert colours_of(page) == [[0, 0, 0]]  # transparent
