@@ -6,6 +6,8 @@
 # What goes in is what the lock file names, by hash; apt brings POV-Ray and libLLVM.
 FROM debian:trixie-slim
 
+# Debian keeps one version of each package in a release, so there is none to pin.
+# hadolint ignore=DL3008
 RUN apt-get update \
     && apt-get install --no-install-recommends --yes git libatomic1 libllvm19 povray python3 python3-venv \
     && rm -rf /var/lib/apt/lists/*

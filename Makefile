@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references findings test fuzz lint stress format lock ui bench scale clean
+.PHONY: help setup suite catalogue references findings test fuzz guided lint stress format audit lock ui bench scale clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -34,6 +34,10 @@ test: lint ## Run all tests
 fuzz: setup ## Read 27,000 malformed files, and note what came of them for `make stress`
 	@SNELLCHECK_STRESS=reports/stress $(BIN)/python -m pytest -q -n 2 tests/fuzz
 
+guided: setup ## Fuzz by coverage, where atheris runs: make guided KIND=scene SECONDS=60
+	@VIRTUAL_ENV=$(CURDIR)/.venv $(BIN)/uv run --quiet --no-project --with atheris \
+		python -m tests.fuzz.guided "$(or $(KIND),scene)" $(or $(SECONDS),60)
+
 lint: setup ## Check style and types
 	@$(BIN)/ruff check --quiet
 	@$(BIN)/ruff format --check --quiet
@@ -46,6 +50,9 @@ stress: setup ## Make faults on purpose, many of each, and write docs/reliabilit
 format: setup ## Mend what of the style can be mended by a program
 	@$(BIN)/ruff check --fix --quiet
 	@$(BIN)/ruff format
+
+audit: setup ## Ask whether vulnerabilities are known of the locked packages (needs a network)
+	@scripts/audit
 
 lock: ## Rebuild requirements/*.txt from pyproject.toml (UPGRADE=1: newer versions)
 	@scripts/lock

@@ -67,10 +67,11 @@ def parse(data: bytes, kind: type[Document], path: Path, what: str = "record") -
         first = error.errors(include_url=False, include_context=False)[0]
         key = ".".join(str(part) or '""' for part in first["loc"])
         position = re.search(r"at line (\d+) column \d+", first["msg"])
+        line = None if key else 1  # what is wrong with all of it is wrong from the beginning
         raise InputError.of(
             f"not a valid {what}: {escaped(first['msg'])[:LONGEST_MESSAGE]}",
             file=path, key=escaped(key)[:LONGEST_KEY],
-            line=int(position[1]) if position else None,
+            line=int(position[1]) if position else line,
         ) from error  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCKS = ("bootstrap", "runtime", "mitsuba", "dev")
+LOCKS = ("bootstrap", "runtime", "mitsuba", "dev", "audit")
 TEXT = {
     *("", ".cfg", ".css", ".html", ".in", ".ini", ".ipynb", ".j2", ".js", ".json", ".md", ".pov"),
     *(".py", ".sh", ".svg", ".toml", ".ts", ".txt", ".yaml", ".yml"),

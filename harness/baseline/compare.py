@@ -24,10 +24,12 @@ from harness.record import (
     Verdict,
 )
 
-# A step of less than a twentieth of the tolerance is called the same. It is a choice, not a
-# finding: on one machine a renderer without noise repeats itself to the last bit, on another its
-# rounding errors move within the tolerance that was derived for them. Many small steps in one
-# direction are for the trend test, which needs no threshold.
+# A step of less than this part of the tolerance is called the same: an exact renderer repeats
+# itself to the last bit on one machine, and its roundings move on another. What hides there is the
+# trend test's to find, and the size follows from that. At its level a suite of 2,300 checks takes
+# ten runs in a row (2 / 10! < 1 - 0.99^(1/2300) < 2 / 9!). So that a slide which nobody was told of
+# is named before it leaves its tolerance from anywhere in the inner half, ten steps must not pass
+# the outer half: a twentieth each.
 STEP = 0.05
 GREEN = (Verdict.PASS, Verdict.KNOWN)
 FAILING = frozenset({BaselineState.REGRESSED, BaselineState.MISSING, BaselineState.STALE})

@@ -1,7 +1,8 @@
 """A baseline: what one renderer measured for one case, approved by a person with a reason.
 
 It is a JSON file small enough for git, with small pictures beside it. A baseline is not the truth;
-it says whether something changed.
+it says whether something changed. It carries the hash of its own text, so that no figure in it can
+change but by an approval.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from harness.record import Check, Stored, Verdict
 BASELINE_SCHEMA: Literal["snellcheck-baseline/1"] = "snellcheck-baseline/1"
 LARGEST_BASELINE = 4 * 2**20  # bytes; a case with a dozen checks has some thousands
 MOST_EARLIER = 20  # approvals remembered before the present one
+_DIGEST_LINE = re.compile(rb'^ "sha256": "[^"\n]*",\n', re.MULTILINE)
 MEASURED = (Verdict.PASS, Verdict.FAIL, Verdict.KNOWN)
 
 
@@ -78,6 +80,7 @@ class Baseline(Model):
     baseline_schema: Literal["snellcheck-baseline/1"] = Field(
         default=BASELINE_SCHEMA, alias="schema"
     )
+    sha256: str = Field(default="", pattern=r"^([0-9a-f]{64})?$")  # see `digest_of`
     case: str
     renderer: str
     version: str
@@ -149,12 +152,31 @@ def parse_baseline(data: bytes, file: Path) -> Kept:
     if len(data) > LARGEST_BASELINE:
         raise InputError.of(f"larger than {LARGEST_BASELINE} bytes", file=file)
     baseline = parse(data, Baseline, file, "baseline")
+    if baseline.sha256 != digest_of(data):
+        raise InputError.of(
+            "has changed since it was approved", file=file, key="sha256",
+            value=baseline.sha256 or "nothing",
+            expected=f"{digest_of(data)}; restore the file, or approve the results again",
+        )  # fmt: skip
     return Kept(baseline, file, hashlib.sha256(data).hexdigest())
 
 
-def write_baseline(baseline: Baseline, file: Path) -> None:
-    """Writes it whole or not at all, without what is empty, so that diffs are short."""
-    text = baseline.model_dump_json(by_alias=True, indent=1, exclude_defaults=True)
+def digest_of(data: bytes) -> str:
+    """The SHA-256 of a baseline's text without the line that holds it, line ends as on Unix."""
+    return hashlib.sha256(_DIGEST_LINE.sub(b"", data.replace(b"\r\n", b"\n"), count=1)).hexdigest()
+
+
+def baseline_text(baseline: Baseline) -> str:
+    """The content of a baseline's file, without what is empty, so that diffs are short."""
+    text = baseline.model_dump_json(
+        by_alias=True, indent=1, exclude_defaults=True, exclude={"sha256"}
+    )
     # The alias has a default and would be left out; a file without its schema says nothing.
-    text = text.replace("{", f'{{\n "schema": "{BASELINE_SCHEMA}",', 1)
-    write_text(file, text + "\n")
+    text = text.replace("{", f'{{\n "schema": "{BASELINE_SCHEMA}",', 1) + "\n"
+    first, end, rest = text.partition(",\n")
+    return f'{first}{end} "sha256": "{digest_of(text.encode())}",\n{rest}'
+
+
+def write_baseline(baseline: Baseline, file: Path) -> None:
+    """Writes it whole or not at all."""
+    write_text(file, baseline_text(baseline))

@@ -24,13 +24,13 @@ class Store:
         self.url = url
 
     def put(self, digest: str, data: bytes) -> None:
-        """Keeps `data`, unless it is there. Raises InputError where the store cannot be reached."""
+        """Keeps `data`, unless it is there and whole. Raises InputError where that cannot be."""
         if "://" not in self.url:
             path = Path(self.url) / _name(digest)
-            if not path.is_file():
+            if not (path.is_file() and path.read_bytes() == data):
                 write_bytes(path, data)
             return
-        self._remote(lambda fs, path: None if fs.exists(path) else _pipe(fs, path, data), digest)
+        self._remote(lambda fs, path: _pipe(fs, path, data), digest)
 
     def get(self, digest: str) -> bytes:
         """The content of that hash. Raises InputError where it is not there or not it."""
@@ -70,5 +70,8 @@ def _name(digest: str) -> str:
 
 
 def _pipe(fs: Any, path: str, data: bytes) -> None:
+    """An upload that broke off leaves part of a file, which is no reason to keep it."""
+    if fs.exists(path) and fs.cat_file(path) == data:
+        return
     fs.makedirs(path.rpartition("/")[0], exist_ok=True)
     fs.pipe_file(path, data)

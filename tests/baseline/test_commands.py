@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from harness import cli, record
+from harness.baseline.document import parse_baseline, write_baseline
 from harness.errors import RendererMissing
 from harness.record import BaselineState, Verdict
 from harness.run import run as run_cases
@@ -239,6 +240,7 @@ def test_nothing_to_compare_with_fails(unapproved: Invoke) -> None:
         (lambda data: data.replace(b"snellcheck-baseline/1", b"snellcheck-baseline/9"), "schema"),
         (lambda data: data.replace(b'"case":', b'"more": 1, "case":'), "more"),
         (lambda data: b"\xff" + data, "not a valid baseline"),
+        (lambda data: data.replace(b'"reason": "first"', b'"reason": "fine"'), "has changed since"),
     ],
 )
 def test_an_unreadable_baseline_fails(damage: object, said: str, work: Invoke) -> None:
@@ -393,8 +395,8 @@ def test_stale_and_damaged_stored_results_are_refused(
     file = next(path for path in baselines() if "ball" in path.name)
     picture = file.with_suffix(".png")
     if harm == "scene":
-        data = json.loads(file.read_text())
-        file.write_text(json.dumps(data | {"scene_fingerprint": "0" * 64}))
+        approved = parse_baseline(file.read_bytes(), file).baseline
+        write_baseline(approved.model_copy(update={"scene_fingerprint": "0" * 64}), file)
     elif harm == "picture":
         picture.write_bytes(picture.read_bytes()[:-1] + b"x")
     else:

@@ -164,6 +164,18 @@ def test_a_slow_slide_within_tolerance_is_found() -> None:
     assert "in some 91 runs" in found.reason  # (1 - 0.09) / 0.01
 
 
+def test_what_hides_in_steps_that_are_the_same_is_named_before_it_matters() -> None:
+    """For as many checks as the catalogue has, from the edge of the inner half of a tolerance."""
+    checks, step = 2300, 0.999 * STEP
+    others = {("c", str(k)): [0.1 * ((7 * j + k) % 10) for j in range(10)] for k in range(checks)}
+    slide = [0.5 + step * k for k in range(10)]
+    assert {state_of(a, b).state for a, b in itertools.pairwise(slide)} == {SAME}
+    for runs, named in ((9, []), (10, ["slides"])):
+        series = others | {("c", "slides"): slide[:runs]}
+        assert [trend.check for trend in trends(series)] == named
+    assert slide[-1] < 1 < slide[-1] + 2 * step  # so a step could not be much larger
+
+
 def test_the_chance_of_a_perfect_order_is_that_of_two_permutations() -> None:
     for n in (5, 8, 10):
         assert chance([k * k for k in range(n)]) == pytest.approx(2 / math.factorial(n))

@@ -78,19 +78,25 @@ def attempt(kind: Kind, path: Path, outcome: Outcome) -> str:
     signal.setitimer(signal.ITIMER_PROF, HANG_S)
     signal.setitimer(signal.ITIMER_REAL, WAIT_S)
     try:
+        return judged(kind, path, outcome)
+    except Hang:
+        return f"no answer within {HANG_S} s:\n{traceback.format_exc(limit=-6)}"
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+
+
+def judged(kind: Kind, path: Path, outcome: Outcome) -> str:
+    """As `attempt`, for as long as it takes."""
+    try:
         kind.read(path)
     except InputError as error:
         outcome.refused += 1
         return next(filter(None, map(_unclear, error.problems)), "") or (
             "" if error.problems else "an error without a message"
         )
-    except Hang:
-        return f"no answer within {HANG_S} s:\n{traceback.format_exc(limit=-6)}"
     except Exception:
         return traceback.format_exc(limit=-6)
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.setitimer(signal.ITIMER_REAL, 0)
     outcome.accepted += 1
     return ""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.baseline.approve import read_choices
-from harness.baseline.document import parse_baseline
+from harness.baseline.document import baseline_text, parse_baseline
 from harness.plan import prepare
 from harness.record import Verdict, read_case, read_summary
 from harness.renderers.command_file import renderer_from_file
@@ -111,7 +111,7 @@ def kinds() -> tuple[Kind, ...]:
     }
     examples = ROOT / "docs" / "bring-your-own-renderer"
     configs = tuple(path.read_bytes() for path in sorted(examples.glob("*.toml")))
-    text = approved.model_dump_json(by_alias=True, indent=1).encode()
+    text = baseline_text(approved).encode()
     return (
         Kind("scene", "scene.toml", small, read_scene),
         Kind("mesh (OBJ)", "mesh.obj", (OBJ,), read_beside),

@@ -48,6 +48,18 @@ def test_the_examples_are_whole(kind: Kind, tmp_path: Path) -> None:
     assert campaign(kind, 0, 0, tmp_path) == Outcome(kind.name, most_mb=pytest.approx(0, abs=9999))
 
 
+@pytest.mark.parametrize("content", [b"1", b"null", b"[]", b'""'])
+@pytest.mark.parametrize("name", ["baseline", "record", "summary", "choices"])
+def test_something_else_altogether_is_told_with_its_place(
+    name: str, content: bytes, tmp_path: Path
+) -> None:
+    """Found by guided fuzzing: what is wrong with all of a document has no key."""
+    kind = next(kind for kind in kinds() if kind.name == name)
+    (tmp_path / kind.file).write_bytes(content)
+    with pytest.raises(InputError, match=rf"{kind.file}:1: not a valid "):
+        kind.read(tmp_path / kind.file)
+
+
 def raising(error: BaseException) -> Any:
     def read(_: Path) -> None:
         raise error
