@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +30,7 @@ NAMES = ["tracer", "povray", "mitsuba", "mitsuba-exact"]
 @pytest.fixture(scope="module")
 def case(
     tmp_path_factory: pytest.TempPathFactory, stock: WorkerRenderer, exact: WorkerRenderer
-) -> Iterator[tuple[Path, CaseRecord]]:
+) -> tuple[Path, CaseRecord]:
     """The tiny ball by all renderers: the run's folder and its record."""
     if shutil.which("povray") is None:
         pytest.skip("no POV-Ray: sudo apt-get install povray")
@@ -40,7 +39,7 @@ def case(
     run_tiny(root, tracer, create("povray"), stock, exact, cases=["ball*"], helper=tracer)
     write_report(root)
     (record,) = map(records.read_case, (root / "records").glob("*.json"))
-    yield root, record
+    return root, record
 
 
 def linear(root: Path, record: CaseRecord, name: str) -> np.ndarray:
