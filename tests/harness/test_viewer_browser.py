@@ -33,11 +33,11 @@ pytestmark = pytest.mark.browser
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A ball and a slab by the tracer and by a student whose glass is too dense."""
+    """A ball, a slab and a critical angle by the tracer and a student whose glass is too dense."""
     root = tmp_path_factory.mktemp("run")
     tracer = create("tracer")
     dense = ("mu = ior_i / ior_t", "mu = ior_i / (1.01 * ior_t)")
-    run_tiny(root, tracer, student(dense), cases=["ball*", "slab*"], helper=tracer)
+    run_tiny(root, tracer, student(dense), cases=["ball*", "slab*", "tir*"], helper=tracer)
     write_report(root)
     return root
 
@@ -112,6 +112,7 @@ def test_ray_errors_are_shown_per_renderer(page: Page, run: Path) -> None:
     open_case(page, run, "slab", "#mode=rays")
     assert panes(page) == ["Ray error of tracer", "Ray error of student"]
     assert "µrad" in page.locator(".colour-scale").inner_text()
+    assert "not measured" in page.locator(".colour-scale").inner_text()
 
 
 def test_the_inspector_says_what_the_exr_says(page: Page, run: Path) -> None:
@@ -282,6 +283,18 @@ def test_pixels_that_are_not_finite_are_marked_and_named(page: Page, states: Pat
     page.reload()
     page.wait_for_selector("#viewer[data-ready]")
     assert page.locator("tr[data-image='povray'] td").first.inner_text() == "∞"
+
+
+def test_where_nothing_was_measured_is_not_what_is_no_number(page: Page, run: Path) -> None:
+    """Rays that are totally reflected have no error, and nothing is wrong with them."""
+    record = open_case(page, run, "tir", "#mode=rays&every=0&a=tracer")
+    assert record.pack
+    probe = read_pack(run / record.pack)["probes"][0]
+    missed = np.isnan(floats(probe["renderers"][0]["error"]["data"]))
+    assert missed.any()
+    colours = colours_of(page)
+    assert [142, 146, 152] in colours
+    assert [255, 0, 255] not in colours
 
 
 def test_sizes_that_differ_are_said_to(page: Page, states: Path) -> None:

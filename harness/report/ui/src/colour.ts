@@ -3,6 +3,7 @@
 export type Rgb = readonly [number, number, number];
 
 export const NOT_FINITE: Rgb = [255, 0, 255]; // NaN and infinities, everywhere
+export const NOT_MEASURED: Rgb = [142, 146, 152]; // where a map has no figure, and needs none
 export const BEYOND: Rgb = [125, 249, 255]; // past the end of a map's scale
 
 // Inferno (CC0), as in harness/report/colours.py.
@@ -38,12 +39,16 @@ function interpolated(knots: readonly Rgb[], size = 1024): Uint8ClampedArray {
 const SCALES = { inferno: interpolated(table(INFERNO)), signed: interpolated(table(SIGNED)) };
 export type ScaleName = keyof typeof SCALES;
 
-/** A scale from `low` to `high`; a logarithmic one shows what is below `low` as its first colour. */
+/**
+ * A scale from `low` to `high`; a logarithmic one shows what is below `low` as its first colour.
+ * With `gaps` NaN means that nothing was measured there.
+ */
 export interface Scale {
   readonly colours: ScaleName;
   readonly low: number;
   readonly high: number;
   readonly log: boolean;
+  readonly gaps?: boolean;
 }
 
 export function share(scale: Scale, value: number): number {
@@ -61,7 +66,7 @@ export function shadeFigures(values: Float32Array, scale: Scale, out: Uint8Clamp
     const at = 4 * k;
     out[at + 3] = 255;
     if (!Number.isFinite(value)) {
-      [out[at], out[at + 1], out[at + 2]] = NOT_FINITE;
+      [out[at], out[at + 1], out[at + 2]] = scale.gaps && Number.isNaN(value) ? NOT_MEASURED : NOT_FINITE;
       continue;
     }
     const part = share(scale, value);

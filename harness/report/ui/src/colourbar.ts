@@ -33,5 +33,6 @@ export function colourBar(scale: Scale, title: string, unit: string): HTMLElemen
       h("span", { class: "muted" }, scale.log ? ", logarithmic; e and E move its end" : "; e and E move its end")),
     h("div", { class: "bar-body" }, canvas, marks, labels),
     h("p", { class: "muted small" }, h("b", { class: "swatch beyond" }, "more"), " ",
-      h("b", { class: "swatch not-finite" }, "not finite or not measured")));
+      scale.gaps ? h("b", { class: "swatch not-measured" }, "not measured")
+        : h("b", { class: "swatch not-finite" }, "not finite")));
 }

@@ -43,7 +43,7 @@ export const MAPS: Partial<Record<Mode, MapMode>> = {
     scale: (exposure) => ({ colours: "inferno", low: 0, high: 2 ** -exposure, log: false }),
     figures: flip,
   },
-  rays: { title: "ray error", unit: "µrad", scale: up(1e5, 9), figures: null },
+  rays: { title: "ray error", unit: "µrad", scale: (exposure) => ({ ...up(1e5, 9)(exposure), gaps: true }), figures: null },
 };
 
 /** Of figures (W × H): the largest that are not neighbours of a larger one, with their places. */
