@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from typing import Any
@@ -14,9 +15,10 @@ from harness.renderers.base import Capability, Rays
 from harness.renderers.needs import needs
 from harness.translate.tracer import translate
 from harness.truth.paths import ClosedForm
+from harness.truth.tree import light_around
 from tests.harness.test_resolve import Document, box, problems_of, resolved_of, scene, sphere
 from tracer.image import render
-from tracer.path import TIR, follow
+from tracer.path import MISS, TIR, follow
 from tracer.scene import Transport
 
 EPS = np.finfo(float).eps
@@ -168,6 +170,25 @@ def test_truth_and_tracer_agree_where_solids_meet(name: str) -> None:
         assert (ours.status == 0).sum() == both.sum()
         assert np.abs(ours.direction - true.direction)[both].max(initial=0) <= 1e-10
         assert np.abs(ours.weight - true.weight)[both].max(initial=0) <= 1e-10
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_light_of_all_paths_agrees_where_solids_meet(name: str) -> None:
+    """Truth follows the whole tree, in which each ray knows of all solids that it is in."""
+    some, depth = rays(1000), 6
+    white = resolved_of(world(*SETS[name][0], surfaces=[], background=[1, 1, 1]))
+    true = light_around(ClosedForm(white), some, depth, min_weight=1e-9)
+    assert np.abs(true.level[:, 0] + true.cut - 1).max() <= 1e-12
+    paths = ["".join(path) for k in range(depth) for path in itertools.product("TR", repeat=k)]
+    level = np.zeros(1000)
+    for path in paths:
+        found = follow(translate(white), some.origins, some.directions, path, vertices=True)
+        # The background is no surface on which a ray lands: it misses after its last interface.
+        gone = (found.status == MISS) & (
+            np.isfinite(found.vertices[:, :, 0]).sum(1) == len(path) + 1
+        )
+        level += np.where(gone, found.weight, 0.0)
+    assert np.abs(level - true.level[:, 0]).max() <= 1e-8  # what is below the least weight, in sum
 
 
 @pytest.mark.parametrize("name", SETS)
