@@ -37,7 +37,7 @@ from harness.scene import resolved as rs
 from harness.scene.resolved import ResolvedScene
 from harness.translate.mitsuba import describe
 from harness.translate.mitsuba_scale import length_scale, scaled
-from harness.translate.mitsuba_shapes import composed
+from harness.translate.mitsuba_shapes import not_in_mitsuba
 
 STOCK_CAPABILITIES = frozenset(
     {
@@ -67,6 +67,7 @@ EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
     Capability.CONIC,
     Capability.CONE,
     Capability.CSG,
+    Capability.PRIORITY,
 }
 
 # An ordinary image is the mean of this many renders with seeds of their own, which tell its
@@ -124,10 +125,10 @@ class _Engine:
 
         gc.collect()
         dr.set_thread_count(settings.threads)
-        without = [k for k, solid in enumerate(scene.solids) if self._is_ours(solid.shape)]
+        without = [k for k, solid in enumerate(scene.solids) if self._is_ours(solid)]
         return load(self._mi, describe(scene, settings.samples, without))
 
-    def _is_ours(self, _shape: rs.SolidShape) -> bool:
+    def _is_ours(self, _solid: rs.Solid) -> bool:
         """Whether Mitsuba is not told of it."""
         return False
 
@@ -234,9 +235,9 @@ class ExactEngine(_Engine):
                 f"works here: {variants.llvm_remedy()}"
             )
 
-    def _is_ours(self, shape: rs.SolidShape) -> bool:
-        """What Mitsuba has no shapes for: `mitsuba_world` finds its boundary."""
-        return composed(shape)
+    def _is_ours(self, solid: rs.Solid) -> bool:
+        """What Mitsuba has no shapes for, or cannot place: `mitsuba_world` finds its boundary."""
+        return not_in_mitsuba(solid)
 
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """Radiance at the pixel centres; the same bits in every run and for any threads."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -21,21 +21,30 @@ OFFSET = 1e-4
 SURFACE, INTERFACE = 0, 1
 
 
+class Interface(NamedTuple):
+    """Of a solid that is not in Mitsuba's scene: its index, and the media on both sides."""
+
+    solid: int
+    inside: int
+    outside: int
+
+
 class Tables:
     """What a hit shape is, by Mitsuba's number of it: facts that BSDFs do not tell.
 
-    `scene` is the (scaled) scene from which `live` was made. Solids `without` are not in `live`,
-    and have the numbers from `first` on.
+    `scene` is the (scaled) scene from which `live` was made. Interfaces that are not in `live` have
+    the numbers from `first` on.
     """
 
-    def __init__(self, live: Any, scene: rs.ResolvedScene, without: Sequence[int] = ()) -> None:
+    def __init__(
+        self, live: Any, scene: rs.ResolvedScene, interfaces: Sequence[Interface] = ()
+    ) -> None:
         numbers = np.array(dr.reinterpret_array(mi.UInt32, live.shapes_dr()))
         self.first = int(numbers.max(initial=0)) + 1
-        kind, index, inside, outside = np.zeros((4, self.first + len(without)), np.uint32)
-        for number, k in enumerate(without, self.first):
-            solid = scene.solids[k]
-            kind[number], index[number] = INTERFACE, k
-            inside[number], outside[number] = solid.medium, solid.exterior
+        kind, index, inside, outside = np.zeros((4, self.first + len(interfaces)), np.uint32)
+        for number, own in enumerate(interfaces, self.first):
+            kind[number], index[number] = INTERFACE, own.solid
+            inside[number], outside[number] = own.inside, own.outside
         for number, shape in zip(numbers, live.shapes(), strict=True):
             role, k = shape.id().split("_")[:2]
             index[number] = int(k)

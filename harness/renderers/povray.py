@@ -100,6 +100,7 @@ class PovRayRenderer:
             Capability.ABSORPTION,
             Capability.FRESNEL,
             Capability.NESTED,
+            Capability.PRIORITY,
             Capability.CAMERA_INSIDE,
         }
     )
@@ -183,8 +184,8 @@ class StockPovRayRenderer(PovRayRenderer):
 
     name = "povray-stock"
     translate = staticmethod(translate_stock)
-    # As users have it, who let solids touch: what comes of that is documented where it is asked.
-    capabilities = PovRayRenderer.capabilities | {Capability.PRIORITY, Capability.DISPERSION}
+    # Solids that touch are written as users write them: what comes of it is documented.
+    capabilities = PovRayRenderer.capabilities | {Capability.DISPERSION}
 
 
 def _write(translated: PovScene, scene: rs.ResolvedScene, folder: Path) -> Path:

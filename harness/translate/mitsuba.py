@@ -153,21 +153,21 @@ def _reference(medium: int) -> Node:
     return {"type": "ref", "id": f"medium_{medium}"}
 
 
-def interface(scene: rs.ResolvedScene, solid: rs.Solid) -> Node:
-    """The BSDF between a solid's medium and its exterior.
+def interface(scene: rs.ResolvedScene, inside: int, outside: int) -> Node:
+    """The BSDF between two media, normals pointing to the one `outside`.
 
     `ext_ior` is always said, because Mitsuba's default is air, 1.000277.
     """
     return {
         "type": "dielectric",
-        "int_ior": scene.media[solid.medium].ior,
-        "ext_ior": scene.media[solid.exterior].ior,
+        "int_ior": scene.media[inside].ior,
+        "ext_ior": scene.media[outside].ior,
     }
 
 
 def _boundary(scene: rs.ResolvedScene, solid: rs.Solid) -> Node:
     """The interface of a solid, one surface for both of its sides, and the media there."""
-    node: Node = {"bsdf": interface(scene, solid)}
+    node: Node = {"bsdf": interface(scene, solid.medium, solid.exterior)}
     if any(scene.media[solid.medium].absorption):
         node["interior"] = _reference(solid.medium)
     if any(scene.media[solid.exterior].absorption):

@@ -30,9 +30,9 @@ def affine(x: Any, y: Any, z: Any, origin: Any) -> Matrix:
     return rows
 
 
-def composed(shape: rs.SolidShape) -> bool:
-    """Whether Mitsuba has no shapes that make it up."""
-    return isinstance(shape, rs.Cone | rs.Lens | rs.Csg)
+def not_in_mitsuba(solid: rs.Solid) -> bool:
+    """Whether Mitsuba has no shapes that make it up, or does not know what is where it overlaps."""
+    return isinstance(solid.shape, rs.Cone | rs.Lens | rs.Csg) or bool(solid.meets)
 
 
 def parts(shape: rs.SolidShape | rs.SurfaceShape) -> Iterator[tuple[str, Node]]:

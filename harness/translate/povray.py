@@ -35,10 +35,12 @@ import numpy as np
 
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
+from harness.scene.arrangement import grouped, meeting
 from harness.scene.containment import bounds, signed_distance
 from harness.translate.mitsuba_scale import scaled
+from harness.translate.povray_contact import within_group
 from harness.translate.povray_fit import SHADOW_FLOOR, exposure, extent, length_scale
-from harness.translate.povray_shapes import number, rgb, shape_text, vector
+from harness.translate.povray_shapes import number, region_text, rgb, shape_text, vector
 
 MAX_TRACE_LEVEL = 256
 # Without a floor for weights POV-Ray follows light between parallel faces for ever.
@@ -48,6 +50,9 @@ LEAST_ADC_BAILOUT = 1e-12
 FADE_DISTANCE = 1e-3 * SHADOW_FLOOR
 PAIR_GAP = 2e-3  # scaled units: 20 hit floors, two shadow floors
 AXIS = {"u": "x", "v": "y"}
+# Nothing, but of infinite extent. POV-Ray passes over an object whose box a ray misses in single
+# precision, as one does that starts a hit floor below the object's top.
+BOUNDLESS = "intersection { plane { <1, 1, 1>, -1e9 } plane { <-1, -1, -1>, -1e9 } }"
 
 
 @dataclass(frozen=True)
@@ -118,8 +123,8 @@ class Writer:
             yield self.absorption(self.scene.media[0].absorption)
         for light in self.scene.lights:
             yield self._light(light)
-        for solid in sorted(self.scene.solids, key=_box_volume, reverse=True):
-            yield self._solid(solid)
+        for k in sorted(range(len(self.scene.solids)), key=self._box_volume, reverse=True):
+            yield self.solid(k)
         for surface in self.scene.surfaces:
             yield self._surface(surface)
 
@@ -165,19 +170,48 @@ class Writer:
 
     # --- solids ---------------------------------------------------------------------------------
 
-    def _solid(self, solid: rs.Solid) -> str:
-        interior = f"interior {{ {self.interior(solid)} }}"
+    def solid(self, k: int) -> str:
+        """One that meets others as `povray_contact` says, any other as it is."""
+        for members in meeting(self.scene.solids):
+            if k in members:
+                return self._member(k, members)
+        return self.alone(k)
+
+    def alone(self, k: int) -> str:
+        solid = self.scene.solids[k]
+        interior = f"interior {{ {self.interior(solid.medium, solid.exterior)} }}"
         return shape_text(solid.shape, self._dielectric(), interior, "hollow", solid=True)
 
-    def interior(self, solid: rs.Solid) -> str:
-        """What a solid is filled with."""
+    def _member(self, k: int, members: tuple[int, ...]) -> str:
+        solids = self.scene.solids
+        if any(isinstance(solids[i].shape, rs.Mesh) for i in members):
+            raise RendererUnsupported("POV-Ray's meshes cannot be cut where they overlap a solid")
+        group = grouped(solids, members)
+        reach = float(np.abs([bounds(solids[i].shape) for i in members]).max())
+        inner, whole = within_group(group, group.members.index(k), reach)
+        clear = "interior_texture { pigment { rgbt 1 } finish { ambient 0 diffuse 0 } }"
+        interior = self.interior(solids[k].medium, group.around)
+        return (
+            "merge {\n  intersection {\n"
+            f"    {region_text(inner, self._dielectric(), clear)}\n"
+            f"    {region_text(whole, self._dielectric())}\n"
+            f"  }}\n  {BOUNDLESS}\n  interior {{ {interior} }}\n  hollow\n}}"
+        )
+
+    def interior(self, inside: int, outside: int) -> str:
+        """What a solid of one medium within another is filled with."""
         media = self.scene.media
-        ior = media[solid.medium].ior / media[0].ior
+        ior = media[inside].ior / media[0].ior
         # POV-Ray adds up the absorption of all solids that a ray is in, and of the atmosphere.
-        inner, outer = media[solid.medium].absorption, media[solid.exterior].absorption
+        inner, outer = media[inside].absorption, media[outside].absorption
         more = [i - o for i, o in zip(inner, outer, strict=True)]
         absorption = f" {self.absorption(more)}" if any(more) else ""
         return f"ior {number(ior)}{absorption}"
+
+    def _box_volume(self, k: int) -> float:
+        """Of the box along the axes around a solid, which is smaller for all that is in it."""
+        low, high = bounds(self.scene.solids[k].shape)
+        return float((high - low).prod())
 
     def _dielectric(self) -> str:
         transport = self.scene.transport
@@ -305,9 +339,3 @@ def _camera(scene: rs.ResolvedScene) -> str:
         f"  up {vector([width * aspect * c for c in camera.up])}\n"
         "}"
     )
-
-
-def _box_volume(solid: rs.Solid) -> float:
-    """Volume of the box along the axes around a solid, which is smaller for all that is in it."""
-    low, high = bounds(solid.shape)
-    return float((high - low).prod())

@@ -25,6 +25,8 @@ FAR = 1e7
 # scene, so that hardly a ray is lost near the edges of prisms and slabs (at 1e-7 two of 65,536 in
 # the complete package were), and still 1e6 times what double precision rounds there.
 REACH = 65536.0
+# And this far where solids reach into each other, by a few hit floors (see `povray_contact`).
+REACH_IN_CONTACT = 8 * REACH
 # Nothing may be thinner than this many hit floors.
 FLOORS = 1000
 
@@ -32,12 +34,13 @@ FLOORS = 1000
 def length_scale(scene: rs.ResolvedScene) -> float:
     """The power of two by which the translator multiplies lengths.
 
-    The scene is made to reach `REACH` units or less; larger, up to a tenth of `FAR`, only where a
-    solid would be thinner than `FLOORS` hit floors. Raises RendererUnsupported where no scale
-    gives both.
+    The scene is made to reach `REACH` units or less, or `REACH_IN_CONTACT` where solids meet;
+    larger, up to a tenth of `FAR`, only where a solid would be thinner than `FLOORS` hit floors.
+    Raises RendererUnsupported where no scale gives both.
     """
     reach = max(_extents(scene), default=1.0) or 1.0
-    factor = 2.0 ** math.floor(math.log2(REACH / reach))
+    aim = REACH_IN_CONTACT if any(solid.meets for solid in scene.solids) else REACH
+    factor = 2.0 ** math.floor(math.log2(aim / reach))
     thinnest = min((thickness(solid.shape) for solid in scene.solids), default=math.inf)
     if thinnest * factor < FLOORS * HIT_FLOOR:
         factor = 2.0 ** math.ceil(math.log2(FLOORS * HIT_FLOOR / thinnest))

@@ -87,36 +87,50 @@ def _parts(where: Region) -> Iterator[str]:
         yield f"  {_region(part)}"
 
 
+def region_text(where: Both | Either, *modifiers: str) -> str:
+    """A region with modifiers for all its faces."""
+    # A union would show the surfaces that one part has inside another.
+    kind = "intersection" if isinstance(where, Both) else "merge"
+    if len(where.parts) == 1:  # of which POV-Ray would say that it is no CSG
+        kind = "object"
+    return f"{kind} {{ {' '.join((*map(_region, where.parts), *modifiers))} }}"
+
+
 def _region(where: Region) -> str:
     match where:
-        case Both(parts):
-            return f"intersection {{ {' '.join(map(_region, parts))} }}"
-        case Either(parts):  # a union would show the surfaces that one part has inside another
-            return f"merge {{ {' '.join(map(_region, parts))} }}"
+        case Both() | Either():
+            return region_text(where)
         case Side(bound, outside):
-            inverse = " inverse" if outside else ""
             if isinstance(bound, HalfSpace):
+                inverse = " inverse" if outside else ""
                 return f"plane {{ {vector(bound.normal)}, {number(bound.offset)}{inverse} }}"
-            return _round(bound, inverse)
+            return _round(bound, outside)
 
 
-def _round(bound: Round, inverse: str) -> str:
-    """A body of revolution; in a frame of its own, so that no digits are lost far away."""
+def _round(bound: Round, outside: bool) -> str:
+    """A body of revolution; in a frame of its own, so that no digits are lost far away.
+
+    POV-Ray's `inverse` turns the normal of a quadric round twice, so that its outside has the
+    texture of its inside: what is outside of one is written as a quadric of the other sign.
+    """
     if bound.c == -1:
         center = np.array(bound.origin) + bound.b / 2 * np.array(bound.axis)
         radius = math.sqrt(bound.a + bound.b**2 / 4)
-        return f"sphere {{ {vector(center)}, {number(radius)}{inverse} }}"
+        return f"sphere {{ {vector(center)}, {number(radius)}{' inverse' if outside else ''} }}"
     frame = any_frame(bound.origin, bound.axis)
     assert frame is not None  # axes of bounds are unit vectors
     rows = ", ".join(number(c) for axis in (frame.x, frame.y, frame.z, frame.origin) for c in axis)
     place = f"matrix <{rows}>"
-    squares = f"<1, 1, {number(-bound.c)}>, <0, 0, 0>"
-    body = f"quadric {{ {squares}, <0, 0, {number(-bound.b)}>, {number(-bound.a)}"
+    sign = -1.0 if outside else 1.0
+    squares, line = vector([sign, sign, -sign * bound.c]), vector([0, 0, -sign * bound.b])
+    body = f"quadric {{ {squares}, <0, 0, 0>, {line}, {number(-sign * bound.a)}"
     if bound.c <= 0:
-        return f"{body}{inverse} {place} }}"
+        return f"{body} {place} }}"
     # A quadric has both nappes or sheets.
-    ahead = f"plane {{ -z, {number(bound.b / (2 * bound.c))} }}"
-    return f"intersection {{ {body} }} {ahead}{inverse} {place} }}"
+    middle = bound.b / (2 * bound.c)
+    if outside:
+        return f"merge {{ {body} }} plane {{ z, {number(-middle)} }} {place} }}"
+    return f"intersection {{ {body} }} plane {{ -z, {number(middle)} }} {place} }}"
 
 
 # --- numbers --------------------------------------------------------------------------------------

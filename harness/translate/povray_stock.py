@@ -49,12 +49,16 @@ class StockWriter(Writer):
         depth, bailout = super().trace_limits()
         return min(depth, TRACE_LEVEL), max(bailout, ADC_BAILOUT)
 
-    def interior(self, solid: rs.Solid) -> str:
+    def solid(self, k: int) -> str:
+        """As it is, whatever it meets."""
+        return self.alone(k)
+
+    def interior(self, inside: int, outside: int) -> str:
         """With what spreads the lines F and C as far as the medium's Abbe number says.
 
         To first order in the spread, of which a heavy flint's square is 3e-4.
         """
-        medium, said = self.scene.media[solid.medium], super().interior(solid)
+        medium, said = self.scene.media[inside], super().interior(inside, outside)
         if medium.abbe is None:
             return said
         spread = 1 + (medium.ior - 1) / (medium.ior * medium.abbe)
