@@ -8,7 +8,7 @@ differences, so it knows curvature, grazing incidence and the neighbourhood of t
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
 from harness.scene.resolved import Rectangle, ResolvedScene
 from harness.truth.camera import primary_rays
+from harness.truth.law import Interface, Law, fresnel, snell
 from harness.truth.paths import ClosedForm, Landing, TruePaths
 from harness.truth.tree import branches, natural_weight
 
@@ -177,6 +178,8 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
     rates = {cause: [none.copy() for _ in range(3)] for cause in ("origin", "direction", "index")}
     trials = [(cause, exact, moved, step) for cause, moved, step in _shifted(rays, STEP * extent)]
     trials += [("index", ClosedForm(denser), rays, step) for denser, step in _denser(scene)]
+    if any(solid.meets for solid in scene.solids):
+        trials.append(("index", ClosedForm(scene, _stepped_ratios(scene)), rays, STEP))
     for cause, form, shifted, step in trials:
         other = form.follow(shifted, path)
         grazing |= _fate_differs(paths, other)
@@ -221,6 +224,20 @@ def _denser(scene: ResolvedScene) -> Iterator[tuple[ResolvedScene, float]]:
     if scene.media[0].ior != 1.0:
         outer = scene.media[0].model_copy(update={"ior": scene.media[0].ior * (1 + STEP)})
         yield scene.model_copy(update={"media": (outer, *scene.media[1:])}), STEP
+
+
+def _stepped_ratios(scene: ResolvedScene) -> Law:
+    """Every ratio of two solids' indices, which may be stored and so be rounded, off by `STEP`.
+
+    Behind parallel faces the indices themselves cancel, but their ratios do not.
+    """
+    outer = scene.media[0].ior
+
+    def stepped(at: Interface) -> Interface:
+        between = (at.ior_i != outer) & (at.ior_t != outer)
+        return replace(at, ior_t=at.ior_t * np.where(between, 1 + STEP, 1.0))
+
+    return Law(bend=lambda at: snell(stepped(at)), reflectance=lambda at: fresnel(stepped(at)))
 
 
 def _extent(scene: ResolvedScene, rays: Rays, landings: tuple[Landing, ...]) -> float:

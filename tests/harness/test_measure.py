@@ -176,6 +176,18 @@ def test_the_condition_by_the_index_is_its_derivative() -> None:
     assert truth.direction.by_index == pytest.approx(slope, rel=1e-3, abs=1e-9)
 
 
+def test_the_condition_by_a_ratio_of_indices_is_its_derivative() -> None:
+    """Behind parallel faces sin(theta) goes with the one ratio of two glasses alone."""
+    made = scene((slab(0, -1), 1, 0), (slab(-1, -2), 2, 0), ior=(1.5, 1.7))
+    panes = [s.model_copy(update={"meets": (1 - k,)}) for k, s in enumerate(made.solids)]
+    film = rs.Film(width=16, height=1)
+    made = made.model_copy(update={"film": film, "solids": tuple(panes)})
+    truth = probe_truth(made, "TTT", (face(-3.0),))
+    cosine = -truth.rays.directions[:, 2]
+    tangent = np.sqrt(1 - cosine**2) / cosine
+    assert truth.direction.by_index == pytest.approx(tangent, rel=1e-3, abs=1e-9)
+
+
 @pytest.mark.parametrize("path", ["T", "TT"])
 def test_single_precision_stays_within_its_tolerance(path: str) -> None:
     """A slab traced in float32, step by step, with the formulas of the textbook."""
