@@ -65,7 +65,6 @@ class Arrays(NamedTuple):
     lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
     background: Floats  # (1, 9): a pattern's row
     nodes: NDArray[np.uint8]  # of all meshes' trees
-    links: NDArray[np.int32]  # the same memory
     triangles: Floats
     normals: Floats
 
@@ -303,7 +302,6 @@ def _flatten(scene: Scene) -> Arrays:
         lights=_table([_light(light) for light in scene.lights], 7),
         background=_table([background], 9),
         nodes=nodes,
-        links=nodes.view(np.int32),
         triangles=np.concatenate([tree.triangles for tree in trees]),
         normals=np.concatenate([tree.normals for tree in trees]),
     )

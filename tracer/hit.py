@@ -199,9 +199,7 @@ def _mesh_hit(
     scene: Arrays, i: int, o: Vec, d: Vec, on_face: int, inward: bool, t_max: float, stack: Floats
 ) -> tuple[float, int, bool]:
     root, side = scene.objects[i, FIRST], -1 if inward else 1
-    t, face, side = mesh_hit(
-        o, d, scene.nodes, scene.links, scene.triangles, root, on_face, side, t_max, stack
-    )
+    t, face, side = mesh_hit(o, d, scene.nodes, scene.triangles, root, on_face, side, t_max, stack)
     return (t if face >= 0 else INF), face, side > 0
 
 

@@ -7,23 +7,33 @@ bounds a medium is refused unless every edge joins exactly two triangles that ag
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.boxes import LINK, WIDTH, first_bit, meets_boxes, prefetch
+from tracer.boxes import (
+    WIDTH,
+    Bytes,
+    Ints,
+    Sight,
+    child_of,
+    first_bit,
+    limit_of,
+    meets_boxes,
+    prefetch,
+    sight,
+)
 from tracer.compiled import called, inlined
 from tracer.errors import SceneError
 from tracer.tree import HIGHEST
 from tracer.vector import Vec, add, cross, dot, normalise, scale, sub
 
 Floats = NDArray[np.float64]
-Bytes = NDArray[np.uint8]
-Ints32 = NDArray[np.int32]
 
 INF = np.inf
-BOTTOM = WIDTH // 2  # the rows of a stack below hold the distances to a node's boxes
-STACK = BOTTOM + HIGHEST
+BOTTOM = WIDTH  # below in the stack are the keys of the boxes that are looked at
+STACK = (BOTTOM + HIGHEST) // 2  # rows of two numbers, each as long as a key
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,20 +124,11 @@ def triangle_distance(
     return max(0.0, height / approach), from_side
 
 
-@inlined
-def _inverse(x: float) -> float:
-    """1 / x, but finite: what is in a box's plane up to rounding counts as in the box."""
-    if abs(x) < 1e-18:
-        x = 1e-18 if x >= 0.0 else -1e-18
-    return 1.0 / x
-
-
 @called
 def mesh_hit(
     o: Vec,
     d: Vec,
     nodes: Bytes,
-    links: Ints32,
     triangles: Floats,
     root: int,
     on_face: int,
@@ -140,59 +141,91 @@ def mesh_hit(
     A ray that has just left triangle `on_face` of this mesh (-1: has not) can only hit other
     triangles, and only from `side`. Those may begin where it stands, within rounding.
     """
-    best, hit, hit_side = t_max, -1, 0
     t_min = 0.0
     if on_face < 0:
         side = 0
     else:
         t_min = -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
-    inverses = (_inverse(d[0]), _inverse(d[1]), _inverse(d[2]))
-    height = _begun(root, stack)
+    query = Query(o, d, sight(o, d, nodes, root), t_min, on_face, side)
+    keys = stack.view(np.int64).reshape(-1)
+    keys[BOTTOM] = root
+    found = Found(t_max, -1, 0)
+    height = BOTTOM + 1
     while height > BOTTOM:
-        height -= 1
-        if stack[height, 0] > best:
-            continue
-        node = int(stack[height, 1])
-        if node >= 0:
-            met = meets_boxes(nodes, node, o, inverses, best, stack)
-            height = _push(met, node, links, nodes, triangles, stack, height)
-            continue
-        leaf = -1 - node
-        for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
-            if triangle != on_face:
-                t, from_side = triangle_distance(o, d, triangles, triangle, side, t_min, best)
-                if from_side != 0:
-                    best, hit, hit_side = t, triangle, from_side
-    return best, hit, hit_side
+        height, found = _step(query, nodes, triangles, keys, height, found)
+    return found
+
+
+class Query(NamedTuple):
+    """A ray, and which of a mesh's triangles it can hit."""
+
+    o: Vec
+    d: Vec
+    sight: Sight
+    t_min: float
+    on_face: int
+    side: int
+
+
+class Found(NamedTuple):
+    t: float
+    triangle: int
+    side: int
 
 
 @inlined
-def _begun(root: int, stack: Floats) -> int:
-    stack[BOTTOM, 0], stack[BOTTOM, 1] = 0.0, root
-    return BOTTOM + 1
+def _step(
+    query: Query,
+    nodes: Bytes,
+    triangles: Floats,
+    keys: Ints,
+    height: int,
+    found: Found,
+) -> tuple[int, Found]:
+    """Looks at what is on top of the stack; its new height, and what is found so far."""
+    height -= 1
+    if keys[height] > limit_of(found.t):
+        return height, found
+    node = child_of(keys[height])
+    if node >= 0:
+        met = meets_boxes(nodes, node, query.sight, limit_of(found.t), keys)
+        return _push(met, keys, nodes, triangles, height), found
+    leaf = -1 - node
+    for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
+        if triangle != query.on_face:
+            t, side = triangle_distance(
+                query.o, query.d, triangles, triangle, query.side, query.t_min, found.t
+            )
+            if side != 0:
+                found = Found(t, triangle, side)
+    return height, found
 
 
 @inlined
-def _push(
-    met: int, node: int, links: Ints32, nodes: Bytes, triangles: Floats, stack: Floats, height: int
-) -> int:
+def _push(met: int, keys: Ints, nodes: Bytes, triangles: Floats, height: int) -> int:
     """Puts the children that are met on the stack, the nearest on top; the stack's height."""
     bottom = height
     while met != 0:
-        k = first_bit(met)
+        key = keys[first_bit(met)]
         met &= met - 1
-        t, child = stack[k // 2, k % 2], links[node, LINK + k]
-        if child >= 0:
-            prefetch(nodes, child)
-        else:
-            prefetch(triangles, (-1 - child) >> 3)
-        at = height
-        while at > bottom and stack[at - 1, 0] < t:
-            stack[at, 0], stack[at, 1] = stack[at - 1, 0], stack[at - 1, 1]
-            at -= 1
-        stack[at, 0], stack[at, 1] = t, child
+        _fetch(child_of(key), nodes, triangles)
+        for at in range(bottom, height):
+            other = keys[at]
+            keys[at], key = max(other, key), min(other, key)
+        keys[height] = key
         height += 1
     return height
+
+
+@inlined
+def _fetch(child: int, nodes: Bytes, triangles: Floats) -> None:
+    """Rays wait for memory more than for anything else, so it is asked for at once."""
+    if child >= 0:
+        prefetch(nodes, child)
+    else:
+        leaf = -1 - child
+        for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
+            prefetch(triangles, triangle)
 
 
 @inlined

@@ -8,7 +8,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.boxes import LEAST, LINK, MOST, NODE, SCALE, STEPS, WIDTH, Bytes
+from tracer.boxes import (
+    CENTER,
+    CORNER,
+    LEAST,
+    LINK,
+    MOST,
+    NODE,
+    REACH,
+    SCALE,
+    SINGLE,
+    STEPS,
+    WIDTH,
+    Bytes,
+)
 from tracer.compiled import called, compiled, inlined
 from tracer.vector import Vec
 
@@ -17,7 +30,6 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 Ints32 = NDArray[np.int32]
 
-SINGLE: Any = np.float32  # which mypy would not take for a number
 INF = SINGLE(np.inf)
 LEAF = 4  # triangles at most in a leaf
 BINS = 16
@@ -26,8 +38,6 @@ DEEP = 48  # below this level ranges are halved, which bounds the tree's height
 HIGHEST = (WIDTH - 1) * (DEEP + 32)
 # To look at a node's boxes costs 1; these are what it costs to fetch a leaf, and per triangle.
 LEAF_COST, TRIANGLE_COST = SINGLE(0.3), SINGLE(0.1)
-# Boxes are wider by this times the largest coordinate: hits count from 1e-15 of it behind a ray.
-MARGIN = 2.0**-47
 EMPTY = -1  # a leaf of no triangles
 FIRST, COUNT, LEFT = range(3)
 
@@ -63,23 +73,24 @@ def grow_tree(vertices: Floats, triangles: Ints, normals: Floats | None) -> Tree
     total = len(triangles)
     corners = np.ascontiguousarray(vertices[triangles]).reshape(-1, 9)
     places = corners.reshape(-1, 3)
-    center = tuple(((places.min(axis=0) + places.max(axis=0)) / 2.0).tolist())
-    margin = MARGIN * float(np.abs(places).max())
+    center = ((places.min(axis=0) + places.max(axis=0)) / 2.0).astype(SINGLE)
     halves = Halves(
         np.empty((total - 1, 3), np.int32),
         np.empty((total - 1, 6), SINGLE),
         np.empty((total, 6), SINGLE),
     )
     order = np.empty(total, np.int32)
-    _bound(corners, center, halves.triangles, order)
+    _bound(corners, tuple(center.tolist()), halves.triangles, order)
     _halve(halves, order, np.empty((DEEP + 32, 4), np.int64), np.empty((BINS, 8), SINGLE))
     shares = np.empty((total, WIDTH), np.uint8)
     _weigh(halves, np.empty((total, WIDTH), SINGLE), np.empty((2, WIDTH), SINGLE), shares)
     nodes = lined_up(total // 2 + 1)
-    views = Views(nodes, nodes.view(np.int32), nodes.view(SINGLE), nodes.view(np.float64))
+    views = Views(nodes, nodes.view(np.int32), nodes.view(SINGLE))
     tops, parts = np.empty(len(nodes), np.int64), np.empty((2 * WIDTH, 2), np.int64)
     boxes = np.empty((WIDTH, 6), SINGLE)
-    count = _fold(halves, shares, center, margin, views, tops, parts, boxes)
+    count = _fold(halves, shares, views, tops, parts, boxes)
+    views.singles[0, CENTER:REACH] = center
+    views.singles[0, REACH] = 1.01 * np.abs(halves.triangles).max()  # boxes are up to 1/254 larger
     in_order = np.empty((0, 9))
     if normals is not None:
         in_order = normals[triangles[order]].reshape(-1, 9)
@@ -290,20 +301,17 @@ def _share(of_halves: Singles, w: int, of_fewer: float) -> tuple[float, int]:
 
 
 class Views(NamedTuple):
-    """The memory of nodes in its four readings."""
+    """The memory of nodes in its three readings."""
 
     sides: Bytes  # (N, NODE)
     links: Ints32
-    scales: Singles
-    origins: Floats
+    singles: Singles
 
 
 @compiled
 def _fold(
     halves: Halves,
     shares: Bytes,
-    center: Vec,
-    margin: float,
     nodes: Views,
     tops: Ints,
     parts: Ints,
@@ -347,30 +355,27 @@ def _fold(
             _put(boxes, child, least, most)
             nodes.links[node, LINK + child] = link
             child += 1
-        _pack(boxes, child, center, margin, nodes, node)
+        _pack(boxes, child, nodes, node)
         node += 1
     return count
 
 
 @called
-def _pack(boxes: Singles, count: int, center: Vec, margin: float, nodes: Views, node: int) -> None:
+def _pack(boxes: Singles, count: int, nodes: Views, node: int) -> None:
     """Writes the boxes of `count` children into a node; the others get boxes inside out."""
-    nodes.scales[node, (SCALE + 12) // 4] = SINGLE(0.0)  # read with the scales, and not used
     for child in range(count, WIDTH):
         nodes.links[node, LINK + child] = EMPTY
     for k in range(3):
         least, most = INF, -INF
         for child in range(count):
             least, most = min(least, boxes[child, k]), max(most, boxes[child, 3 + k])
-        origin = np.float64(least) + center[k] - margin
-        reach = np.float64(most) + center[k] + margin - origin
-        scale = SINGLE(max(1e-30, reach / (STEPS - 1.0)))
-        nodes.origins[node, k], nodes.scales[node, SCALE // 4 + k] = origin, scale
+        corner = np.float64(least)
+        scale = SINGLE(max(1e-30, (np.float64(most) - corner) / (STEPS - 1.0)))
+        nodes.singles[node, CORNER + k], nodes.singles[node, SCALE + k] = least, scale
         for child in range(WIDTH):
             low, high = STEPS, 0.0
             if child < count:
-                a, b = np.float64(boxes[child, k]), np.float64(boxes[child, 3 + k])
-                low = np.floor((a + center[k] - margin - origin) / scale)
-                high = np.ceil((b + center[k] + margin - origin) / scale)
+                low = np.floor((np.float64(boxes[child, k]) - corner) / scale)
+                high = np.ceil((np.float64(boxes[child, 3 + k]) - corner) / scale)
             nodes.sides[node, LEAST + WIDTH * k + child] = np.uint8(low)
             nodes.sides[node, MOST + WIDTH * k + child] = np.uint8(high)

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tracer import boxes
-from tracer.boxes import LEAST, LINK, MOST, SCALE, WIDTH
+from tracer.boxes import CENTER, CORNER, LEAST, LINK, MOST, REACH, SCALE, WIDTH
 from tracer.compiled import compiled
 from tracer.mesh import STACK, Mesh, mesh_hit, triangle_distance
 from tracer.tree import LEAF, Tree, grow_tree
@@ -50,9 +50,9 @@ def rays(mesh: Mesh, count: int, seed: int) -> tuple[Floats, Floats]:
 
 @compiled
 def _through_tree(
-    o: Vec, d: Vec, nodes: Floats, links: Floats, triangles: Floats, stack: Floats
+    o: Vec, d: Vec, nodes: Floats, triangles: Floats, stack: Floats
 ) -> tuple[float, int, int]:
-    return mesh_hit(o, d, nodes, links, triangles, 0, -1, 0, np.inf, stack)
+    return mesh_hit(o, d, nodes, triangles, 0, -1, 0, np.inf, stack)
 
 
 @compiled
@@ -71,7 +71,7 @@ def distances(tree: Tree, o: Floats, d: Floats) -> tuple[list[float], list[float
     by_tree, by_all = [], []
     for origin, direction in zip(o.tolist(), d.tolist(), strict=True):
         ray = tuple(origin), tuple(direction)
-        t, hit, _ = _through_tree(*ray, tree.nodes, tree.links, tree.triangles, stack)
+        t, hit, _ = _through_tree(*ray, tree.nodes, tree.triangles, stack)
         by_tree.append(t if hit >= 0 else np.inf)
         by_all.append(_one_by_one(*ray, tree.triangles))
     return by_tree, by_all
@@ -124,7 +124,7 @@ def test_a_tree_is_not_too_high_for_the_stack() -> None:
     def height(node: int) -> int:
         return 1 + max(height(k) if k >= 0 else 0 for k in tree.links[node, LINK:].tolist())
 
-    assert WIDTH // 2 + (WIDTH - 1) * height(0) <= STACK
+    assert WIDTH + (WIDTH - 1) * height(0) <= 2 * STACK
 
 
 @pytest.mark.parametrize("make", MESHES.values(), ids=MESHES.keys())
@@ -134,10 +134,13 @@ def test_every_triangle_is_in_one_leaf_and_every_box_around_what_is_below(
     mesh = make()
     tree = tree_of(mesh)
     seen = np.zeros(len(tree.triangles), int)
+    center = tree.nodes.view(np.float32)[0, CENTER:REACH].astype(float)
+    rounding = 4 * EPS * np.abs(mesh.vertices).max()
 
     def below(node: int) -> tuple[Floats, Floats]:
         row = tree.nodes[node]
-        origin, scale = row[:SCALE].view(float), row[SCALE : SCALE + 12].view(np.float32)
+        frame = row[:LEAST].view(np.float32).astype(float)
+        corner, scale = frame[CORNER : CORNER + 3] + center, frame[SCALE : SCALE + 3]
         least, most = [], []
         for k in range(WIDTH):
             child = int(tree.links[node, LINK + k])
@@ -152,8 +155,8 @@ def test_every_triangle_is_in_one_leaf_and_every_box_around_what_is_below(
                 corners = tree.triangles[first : first + count].reshape(-1, 3)
                 low, high = corners.min(axis=0), corners.max(axis=0)
             sides = [row[at + k : at + 24 : WIDTH] for at in (LEAST, MOST)]
-            assert (origin + sides[0] * scale.astype(float) < low).all()
-            assert (origin + sides[1] * scale.astype(float) > high).all()
+            assert (corner + sides[0] * scale - rounding <= low).all()
+            assert (corner + sides[1] * scale + rounding >= high).all()
             least.append(low)
             most.append(high)
         return np.min(least, axis=0), np.max(most, axis=0)
@@ -165,29 +168,32 @@ def test_every_triangle_is_in_one_leaf_and_every_box_around_what_is_below(
 
 
 @compiled
-def _by_machine(
-    nodes: Floats, node: int, o: Vec, inverses: Vec, farthest: float, distances: Floats
-) -> int:
-    return boxes.meets_boxes(nodes, node, o, inverses, farthest, distances)
+def _by_machine(o: Vec, d: Vec, nodes: Floats, node: int, farthest: float, keys: Floats) -> int:
+    ray = boxes.sight(o, d, nodes, 0)
+    return boxes.meets_boxes(nodes, node, ray, boxes.limit_of(farthest), keys)
 
 
-@pytest.mark.parametrize("name", ["many", "far away", "9 triangles"])
+@compiled
+def _sight(o: Vec, d: Vec, nodes: Floats) -> boxes.Sight:
+    return boxes.sight(o, d, nodes, 0)
+
+
+@pytest.mark.parametrize("name", ["many", "far away", "flat", "9 triangles"])
 def test_machine_code_does_what_is_written_in_python(name: str) -> None:
-    """Bit by bit: which boxes are met, and where the ray enters each of those."""
+    """Bit by bit: which boxes are met, and the keys of all."""
     mesh = MESHES[name]()
     tree = tree_of(mesh)
     rng = np.random.default_rng(8)
-    entered, expected = np.empty((2, 4, 2))
+    of_machine, of_python = np.empty((2, WIDTH), np.int64)
     met = 0
     for origin, direction in zip(*rays(mesh, 400, 6), strict=True):
-        d = np.where(direction == 0.0, 1e-18, direction)
-        ray = tuple(origin.tolist()), tuple((1.0 / d).tolist())
+        o, d = tuple(origin.tolist()), tuple(direction.tolist())
         node, near = int(rng.integers(len(tree.nodes))), float(rng.exponential(3.0))
         for farthest in (near, np.inf):
-            found = _by_machine(tree.nodes, node, *ray, farthest, entered)
-            with np.errstate(over="ignore", invalid="ignore"):
-                of_python = boxes.in_python(tree.nodes, node, *ray, farthest, expected.ravel())
-            assert found == of_python
-            assert np.array_equal(entered, expected)
+            found = _by_machine(o, d, tree.nodes, node, farthest, of_machine)
+            limit = boxes.limit_in_python(farthest)
+            expected = boxes.in_python(tree.nodes, node, _sight(o, d, tree.nodes), limit, of_python)
+            assert found == expected
+            assert np.array_equal(of_machine, of_python)
             met += found.bit_count()
     assert met > 0
