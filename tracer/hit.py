@@ -21,7 +21,7 @@ from tracer.arrays import (
     Floats,
 )
 from tracer.compiled import inlined
-from tracer.mesh import STACK, mesh_hit, smooth_normal, triangle_normal
+from tracer.mesh import smooth_normal, triangle_normal
 from tracer.shapes import (
     HOLLOW,
     INF,
@@ -36,6 +36,7 @@ from tracer.shapes import (
 )
 from tracer.shared import OF_PLACES
 from tracer.vector import Vec, along, dot, scale, sub
+from tracer.walk import STACK, Lanes, mesh_hit, mesh_hits
 
 NOTHING = -1
 UNKNOWN = -1  # the medium of a ray that begins somewhere
@@ -81,9 +82,26 @@ def nearest_hit(
     is on both sides are passed over. Where two of them are nearer to each other than rounding, each
     seems to lie before the other; a ray that makes no way there goes on beyond both.
     """
+    return nearest_hit_knowing(scene, o, d, medium, left, left_face, inward, stack[:0], stack)
+
+
+@inlined
+def nearest_hit_knowing(
+    scene: Arrays,
+    o: Vec,
+    d: Vec,
+    medium: int,
+    left: int,
+    left_face: int,
+    inward: bool,
+    known: Floats,
+    stack: Floats,
+) -> Hit:
+    """As `nearest_hit`, where `known` has the hits of all meshes, or none (see `mesh_hits`)."""
     travelled, waiting = 0.0, 0
     while True:
-        hit = _next_hit(scene, o, d, medium, left, left_face, inward, stack)
+        hit = _next_hit(scene, o, d, medium, left, left_face, inward, known, stack)
+        known = stack[:0]
         visible = hit.object == NOTHING or hit.object >= scene.solids or hit.beyond != hit.medium
         if visible:
             return Hit(
@@ -114,6 +132,7 @@ def _next_hit(
     left: int,
     left_face: int,
     inward: bool,
+    known: Floats,
     stack: Floats,
 ) -> Hit:
     """As `nearest_hit`, but all boundaries of solids count.
@@ -122,12 +141,16 @@ def _next_hit(
     order of their rank, also finds the first that it is in before the hit, and behind it.
     """
     best, hit, face, entering = INF, NOTHING, -1, False
-    before, beyond = AMBIENT, AMBIENT
+    before, beyond, mesh = AMBIENT, AMBIENT, 0
     leaving = _surface_left(scene, left, left_face, inward)
     for i in range(len(scene.objects)):
         on_face = left_face if i == left else -1
         t_max = INF if i < scene.solids else best
-        t, i_face, enters = _object_hit(scene, i, o, d, on_face, inward, leaving, t_max, stack)
+        if len(known) > 0 and scene.objects[i, SHAPE] == MESH:
+            t, i_face, enters = known[mesh, 0], int(known[mesh, 1]), known[mesh, 2] > 0.0
+            mesh += 1
+        else:
+            t, i_face, enters = _object_hit(scene, i, o, d, on_face, inward, leaving, t_max, stack)
         if t == INF:
             continue
         if i < scene.solids:
@@ -201,6 +224,21 @@ def _mesh_hit(
     root, side = scene.objects[i, FIRST], -1 if inward else 1
     t, face, side = mesh_hit(o, d, scene.nodes, scene.triangles, root, on_face, side, t_max, stack)
     return (t if face >= 0 else INF), face, side > 0
+
+
+@inlined
+def mesh_hits_ahead(
+    scene: Arrays, origins: Floats, directions: Floats, found: Floats, lanes: Lanes
+) -> None:
+    """What rays that begin meet of each mesh: `found` (n, meshes, 3), see `walk.mesh_hits`."""
+    mesh = 0
+    for i in range(len(scene.objects)):
+        if scene.objects[i, SHAPE] == MESH:
+            root = scene.objects[i, FIRST]
+            mesh_hits(
+                origins, directions, scene.nodes, scene.triangles, root, found[:, mesh], lanes
+            )
+            mesh += 1
 
 
 @inlined

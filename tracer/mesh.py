@@ -1,4 +1,4 @@
-"""Solids made of triangles, and which of them a ray meets.
+"""Solids made of triangles, and where a ray meets one.
 
 "Models must be complete: no holes! All faces (triangles) must be tagged to a solid." A mesh that
 bounds a medium is refused unless every edge joins exactly two triangles that agree on outside.
@@ -7,33 +7,17 @@ bounds a medium is refused unless every edge joins exactly two triangles that ag
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.boxes import (
-    WIDTH,
-    Bytes,
-    Ints,
-    Sight,
-    child_of,
-    first_bit,
-    limit_of,
-    meets_boxes,
-    prefetch,
-    sight,
-)
 from tracer.compiled import called, inlined
 from tracer.errors import SceneError
-from tracer.tree import HIGHEST
 from tracer.vector import Vec, add, cross, dot, normalise, scale, sub
 
 Floats = NDArray[np.float64]
 
 INF = np.inf
-BOTTOM = WIDTH  # below in the stack are the keys of the boxes that are looked at
-STACK = (BOTTOM + HIGHEST) // 2  # rows of two numbers, each as long as a key
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +73,7 @@ def require_closed(mesh: Mesh, name: str) -> None:
         raise SceneError(f"{name}: triangles must be counter-clockwise from outside")
 
 
-# --- tracing --------------------------------------------------------------------------------------
+# --- one triangle ---------------------------------------------------------------------------------
 
 
 @inlined
@@ -122,110 +106,6 @@ def triangle_distance(
     if min(u, v, w) < 0.0 < max(u, v, w):
         return INF, 0
     return max(0.0, height / approach), from_side
-
-
-@called
-def mesh_hit(
-    o: Vec,
-    d: Vec,
-    nodes: Bytes,
-    triangles: Floats,
-    root: int,
-    on_face: int,
-    side: int,
-    t_max: float,
-    stack: Floats,
-) -> tuple[float, int, int]:
-    """(distance, triangle, side) of the nearest hit before `t_max`; triangle -1 if there is none.
-
-    A ray that has just left triangle `on_face` of this mesh (-1: has not) can only hit other
-    triangles, and only from `side`. Those may begin where it stands, within rounding.
-    """
-    t_min = 0.0
-    if on_face < 0:
-        side = 0
-    else:
-        t_min = -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
-    query = Query(o, d, sight(o, d, nodes, root), t_min, on_face, side)
-    keys = stack.view(np.int64).reshape(-1)
-    keys[BOTTOM] = root
-    found = Found(t_max, -1, 0)
-    height = BOTTOM + 1
-    while height > BOTTOM:
-        height, found = _step(query, nodes, triangles, keys, height, found)
-    return found
-
-
-class Query(NamedTuple):
-    """A ray, and which of a mesh's triangles it can hit."""
-
-    o: Vec
-    d: Vec
-    sight: Sight
-    t_min: float
-    on_face: int
-    side: int
-
-
-class Found(NamedTuple):
-    t: float
-    triangle: int
-    side: int
-
-
-@inlined
-def _step(
-    query: Query,
-    nodes: Bytes,
-    triangles: Floats,
-    keys: Ints,
-    height: int,
-    found: Found,
-) -> tuple[int, Found]:
-    """Looks at what is on top of the stack; its new height, and what is found so far."""
-    height -= 1
-    if keys[height] > limit_of(found.t):
-        return height, found
-    node = child_of(keys[height])
-    if node >= 0:
-        met = meets_boxes(nodes, node, query.sight, limit_of(found.t), keys)
-        return _push(met, keys, nodes, triangles, height), found
-    leaf = -1 - node
-    for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
-        if triangle != query.on_face:
-            t, side = triangle_distance(
-                query.o, query.d, triangles, triangle, query.side, query.t_min, found.t
-            )
-            if side != 0:
-                found = Found(t, triangle, side)
-    return height, found
-
-
-@inlined
-def _push(met: int, keys: Ints, nodes: Bytes, triangles: Floats, height: int) -> int:
-    """Puts the children that are met on the stack, the nearest on top; the stack's height."""
-    bottom = height
-    while met != 0:
-        key = keys[first_bit(met)]
-        met &= met - 1
-        _fetch(child_of(key), nodes, triangles)
-        for at in range(bottom, height):
-            other = keys[at]
-            keys[at], key = max(other, key), min(other, key)
-        keys[height] = key
-        height += 1
-    return height
-
-
-@inlined
-def _fetch(child: int, nodes: Bytes, triangles: Floats) -> None:
-    """Rays wait for memory more than for anything else, so it is asked for at once."""
-    if child >= 0:
-        prefetch(nodes, child)
-    else:
-        leaf = -1 - child
-        for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
-            prefetch(triangles, triangle)
 
 
 @inlined

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +13,10 @@ from tracer.arrays import (
     EXTERIOR,
     MATERIAL,
     MEDIUM,
+    MESH,
     MIRROR,
     NORMALS,
+    SHAPE,
     THIN_SLAB,
     TRANSLUCENT,
     Arrays,
@@ -23,12 +26,14 @@ from tracer.arrays import (
 )
 from tracer.compiled import compiled, inlined
 from tracer.errors import SceneError
-from tracer.hit import NOTHING, UNKNOWN, hit_point, nearest_hit, new_stack
+from tracer.hit import NOTHING, UNKNOWN, hit_point, mesh_hits_ahead, nearest_hit_knowing, new_stack
 from tracer.optics import reflect
 from tracer.scene import Scene
+from tracer.shapes import vec_at
 from tracer.surface import interface, thin_slab, upright
 from tracer.threads import for_bands
 from tracer.vector import Vec, dot, scale
+from tracer.walk import Lanes, new_lanes
 
 MOST_LEGS = 32  # of a main way that are kept
 NO_LEG = -2
@@ -161,6 +166,7 @@ def _follow_one(
     main: bool,
     max_depth: int,
     log: Log,
+    known: Floats,
     stack: Floats,
 ) -> tuple[int, int, Vec, Vec, float, float]:
     """(status, object or NOTHING, last point, last direction, weight, optical length).
@@ -172,9 +178,10 @@ def _follow_one(
     step, corners = 0, 0
     while True:
         corners = _keep(log.vertices, corners, o)
-        hit, face, t, entering, medium, beyond = nearest_hit(
-            scene, o, d, medium, left, left_face, inward, stack
+        hit, face, t, entering, medium, beyond = nearest_hit_knowing(
+            scene, o, d, medium, left, left_face, inward, known, stack
         )
+        known = known[:0]
         if corners <= len(log.solid):
             log.solid[corners - 1] = medium
         if hit == NOTHING:
@@ -235,11 +242,14 @@ def _follow(
     begin: int,
     end: int,
     found: Paths,
+    ahead: Floats,
+    lanes: Lanes,
     stack: Floats,
 ) -> None:
+    """`ahead` (end - begin, meshes, 3), `lanes` and `stack` are scratch."""
+    mesh_hits_ahead(scene, origins[begin:end], directions[begin:end], ahead, lanes)
     for i in range(begin, end):
-        o = (origins[i, 0], origins[i, 1], origins[i, 2])
-        d = (directions[i, 0], directions[i, 1], directions[i, 2])
+        o, d = vec_at(origins, i, 0), vec_at(directions, i, 0)
         k = i if len(found.vertices) == len(origins) else 0  # all share one row that is empty
         log = Log(
             found.vertices[k],
@@ -249,7 +259,7 @@ def _follow(
             found.reflectance[k],
         )
         status, hit, p, d, weight, length = _follow_one(
-            scene, o, d, letters, main, max_depth, log, stack
+            scene, o, d, letters, main, max_depth, log, ahead[i - begin], stack
         )
         found.status[i], found.weight[i], found.optical_length[i] = status, weight, length
         found.surface[i] = hit - solids if status == HIT else -1
@@ -288,10 +298,12 @@ def follow(
     arrays = flatten(scene)
     letters = np.frombuffer((path or "").encode(), np.uint8).copy()
     main = path is None
+    meshes = int((arrays.objects[:, SHAPE] == MESH).sum())
 
     def some(begin: int, end: int) -> None:
-        stack = new_stack(arrays)
-        _follow(arrays, solids, o, d, letters, main, max_depth, begin, end, found, stack)
+        ahead = np.empty((end - begin, meshes, 3))
+        scratch = ahead, new_lanes(), new_stack(arrays)
+        _follow(arrays, solids, o, d, letters, main, max_depth, begin, end, found, *scratch)
 
     for_bands(some, n, BAND, threads)
     if not vertices:
@@ -319,13 +331,22 @@ def _empty(n: int, legs: int, log: bool) -> Paths:
     )
 
 
+@compiled
+def _first_bad_ray(origins: Floats, directions: Floats) -> int:
+    """The first whose origin is not finite or whose direction is not of unit length; or -1."""
+    for i in range(len(origins)):
+        o, d = vec_at(origins, i, 0), vec_at(directions, i, 0)
+        finite = abs(o[0]) < np.inf and abs(o[1]) < np.inf and abs(o[2]) < np.inf
+        if not (finite and abs(math.sqrt(dot(d, d)) - 1.0) < 1e-9):
+            return i
+    return -1
+
+
 def _require_rays(origins: Floats, directions: Floats) -> None:
     if origins.shape != directions.shape:
         raise SceneError(f"{len(origins)} origins, but {len(directions)} directions")
-    length = np.linalg.norm(directions, axis=1)
-    bad = ~(np.abs(length - 1.0) < 1e-9) | ~np.isfinite(origins).all(axis=1)
-    if bad.any():
-        k = int(np.argmax(bad))
+    k = _first_bad_ray(origins, directions)
+    if k >= 0:
         raise SceneError(
             f"ray {k} needs a finite origin and a unit direction, "
             f"not {origins[k].tolist()} and {directions[k].tolist()}"

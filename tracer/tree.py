@@ -23,10 +23,11 @@ from tracer.boxes import (
     Bytes,
 )
 from tracer.compiled import called, compiled, inlined
+from tracer.shapes import vec_at
 from tracer.vector import Vec
 
 Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
+Singles = NDArray[Any]  # in single precision
 Ints = NDArray[np.int64]
 Ints32 = NDArray[np.int32]
 
@@ -37,7 +38,7 @@ DEEP = 48  # below this level ranges are halved, which bounds the tree's height
 # What can wait on the way down to one of 2^32 triangles.
 HIGHEST = (WIDTH - 1) * (DEEP + 32)
 # To look at a node's boxes costs 1; these are what it costs to fetch a leaf, and per triangle.
-LEAF_COST, TRIANGLE_COST = SINGLE(0.3), SINGLE(0.1)
+LEAF_COST, TRIANGLE_COST = SINGLE(0.2), SINGLE(0.2)
 EMPTY = -1  # a leaf of no triangles
 FIRST, COUNT, LEFT = range(3)
 
@@ -105,11 +106,6 @@ def lined_up(count: int) -> Bytes:
 
 
 # --- halves ---------------------------------------------------------------------------------------
-
-
-@inlined
-def _corner(boxes: Singles, row: int, at: int) -> Vec:
-    return boxes[row, at], boxes[row, at + 1], boxes[row, at + 2]
 
 
 @inlined
@@ -186,7 +182,7 @@ def _split(boxes: Singles, order: Ints32, first: int, last: int, bins: Singles, 
     """
     least, most = (INF, INF, INF), (-INF, -INF, -INF)
     for i in range(first, last):
-        a, b = _corner(boxes, i, 0), _corner(boxes, i, 3)
+        a, b = vec_at(boxes, i, 0), vec_at(boxes, i, 3)
         middle = a[0] + b[0], a[1] + b[1], a[2] + b[2]
         least, most = _least(least, middle), _most(most, middle)
     axis, low, extent = 0, least[0], most[0] - least[0]
@@ -204,8 +200,8 @@ def _split(boxes: Singles, order: Ints32, first: int, last: int, bins: Singles, 
         bins[k, 6] = SINGLE(0.0)
     for i in range(first, last):
         k = _bin(boxes, i, axis, low, to_bin)
-        a, b = _corner(boxes, i, 0), _corner(boxes, i, 3)
-        _put(bins, k, _least(_corner(bins, k, 0), a), _most(_corner(bins, k, 3), b))
+        a, b = vec_at(boxes, i, 0), vec_at(boxes, i, 3)
+        _put(bins, k, _least(vec_at(bins, k, 0), a), _most(vec_at(bins, k, 3), b))
         bins[k, 6] += SINGLE(1.0)
     best = _cheapest(bins, count)
 
@@ -234,7 +230,7 @@ def _cheapest(bins: Singles, count: int) -> int:
         least, most, n = (INF, INF, INF), (-INF, -INF, -INF), SINGLE(0.0)
         for step in range(count - 1):
             k = step if backwards == 0 else count - 1 - step
-            least, most = _least(least, _corner(bins, k, 0)), _most(most, _corner(bins, k, 3))
+            least, most = _least(least, vec_at(bins, k, 0)), _most(most, vec_at(bins, k, 3))
             n += bins[k, 6]
             cost = n * _half_area(least, most) if n > SINGLE(0.0) else SINGLE(0.0)
             if backwards == 0:
@@ -264,15 +260,15 @@ def _weigh(halves: Halves, costs: Singles, of_halves: Singles, shares: Bytes) ->
             half = node + 1 if side == 0 else node + left
             if (left if side == 0 else count - left) == 1:
                 boxes, half = halves.triangles, first if side == 0 else first + left
-                area = _half_area(_corner(boxes, half, 0), _corner(boxes, half, 3))
+                area = _half_area(vec_at(boxes, half, 0), vec_at(boxes, half, 3))
                 for k in range(WIDTH):
                     of_halves[side, k] = area * (LEAF_COST + TRIANGLE_COST)
             else:
                 boxes = halves.boxes
                 for k in range(WIDTH):
                     of_halves[side, k] = costs[half, k]
-            least = _least(least, _corner(boxes, half, 0))
-            most = _most(most, _corner(boxes, half, 3))
+            least = _least(least, vec_at(boxes, half, 0))
+            most = _most(most, vec_at(boxes, half, 3))
         _put(halves.boxes, node, least, most)
 
         area = _half_area(least, most)
@@ -333,7 +329,7 @@ def _fold(
             part, w = parts[waiting, 0], parts[waiting, 1]
             if part < 0:
                 first, triangles, of = -1 - part, 1, halves.triangles
-                least, most = _corner(of, first, 0), _corner(of, first, 3)
+                least, most = vec_at(of, first, 0), vec_at(of, first, 3)
             else:
                 while w > 1 and shares[part, w - 1] == 0:
                     w -= 1
@@ -346,7 +342,7 @@ def _fold(
                     parts[waiting + 1, 0] = part + 1 if left > 1 else -1 - first
                     waiting += 2
                     continue
-                least, most = _corner(halves.boxes, part, 0), _corner(halves.boxes, part, 3)
+                least, most = vec_at(halves.boxes, part, 0), vec_at(halves.boxes, part, 3)
             if part >= 0 and shares[part, 0] == 1:
                 tops[count], link = part, count
                 count += 1

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from tracer import boxes
 from tracer.boxes import CENTER, CORNER, LEAST, LINK, MOST, REACH, SCALE, WIDTH
 from tracer.compiled import compiled
-from tracer.mesh import STACK, Mesh, mesh_hit, triangle_distance
+from tracer.mesh import Mesh, triangle_distance
 from tracer.tree import LEAF, Tree, grow_tree
 from tracer.vector import Vec
+from tracer.walk import LANES, STACK, Lanes, mesh_hit, mesh_hits, new_lanes
 
 Floats = np.ndarray
 EPS = float(np.finfo(float).eps)
@@ -165,6 +166,33 @@ def test_every_triangle_is_in_one_leaf_and_every_box_around_what_is_below(
     assert (seen == 1).all()
     given_corners = np.sort(mesh.vertices[mesh.triangles].reshape(-1, 9), axis=0)
     assert np.array_equal(np.sort(tree.triangles, axis=0), given_corners)
+
+
+@compiled
+def _side_by_side(
+    origins: Floats,
+    directions: Floats,
+    nodes: Floats,
+    triangles: Floats,
+    found: Floats,
+    lanes: Lanes,
+) -> None:
+    mesh_hits(origins, directions, nodes, triangles, 0, found, lanes)
+
+
+@pytest.mark.parametrize("count", [0, 1, LANES - 1, LANES + 1, 500])
+def test_rays_that_take_turns_find_what_each_finds_alone(count: int) -> None:
+    """To the last bit: a turn is the same step, whoever's it is."""
+    mesh = soup(3000, 1, size=0.05)
+    tree, (o, d) = tree_of(mesh), rays(mesh, count, 9)
+    found, stack = np.full((count, 3), np.nan), np.empty((STACK, 2))
+    _side_by_side(o, d, tree.nodes, tree.triangles, found, new_lanes())
+    alone = [
+        _through_tree(tuple(a), tuple(b), tree.nodes, tree.triangles, stack)
+        for a, b in zip(o.tolist(), d.tolist(), strict=True)
+    ]
+    assert found.tolist() == [list(hit) for hit in alone]
+    assert count < 500 or 50 < np.isfinite(found[:, 0]).sum() < 450
 
 
 @compiled
