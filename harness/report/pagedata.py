@@ -15,6 +15,8 @@ from harness.report.chart import LEFT, RIGHT, Chart
 from harness.report.links import RunFolder, clean
 from harness.report.view import renderer_verdict
 
+BASELINE = "baseline: "  # what approved pictures are called by
+
 
 def case_data(
     record: CaseRecord, folder: RunFolder, colours: Mapping[str, str], charts: Sequence[Chart]
@@ -26,7 +28,11 @@ def case_data(
     return embeddable(
         {
             "id": record.id,
-            "packs": [{"href": href, "prefix": clean(prefix)} for prefix, href in found if href],
+            "packs": [
+                {"href": href, "prefix": clean(prefix), "aside": prefix == BASELINE}
+                for prefix, href in found
+                if href
+            ],
             "colours": dict(colours),
             "verdicts": {name: verdict for name, verdict in verdicts.items() if verdict},
             "suspects": _suspects(record),

@@ -7,10 +7,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from harness import cli, record
+from harness import cli, imagefile, record
 from harness.baseline.document import parse_baseline, write_baseline
 from harness.errors import RendererMissing
 from harness.record import BaselineState, Verdict
@@ -19,6 +20,7 @@ from tests.fakes.student import student
 from tests.harness.test_cli import REGISTERED, Invoke, invoke
 from tests.harness.test_run import Absent
 from tests.harness.tiny import SCENES, checks_of, prepared
+from tests.harness.unpack import pixels, read_pack
 
 __all__ = ["invoke"]  # a fixture
 
@@ -81,6 +83,24 @@ def test_what_has_not_changed_is_the_same(work: Invoke) -> None:
     assert not summary.baseline.failed
     cases = [record.read_case(path) for path in (Path("out") / "records").iterdir()]
     assert {c.baseline.state for case in cases for c in case.checks if c.baseline} == states("out")
+
+
+def test_the_report_of_a_check_has_the_approved_pictures(work: Invoke) -> None:
+    """To be chosen in the viewer, to half a step of sixteen bits; and only of what was approved."""
+    for _ in range(2):
+        assert work("check", "ball", "-r", "student", "--run", "out").exit_code == 0
+        (path,) = Path("out/records").glob("ball*.json")
+        known = record.read_case(path)
+        packed = read_pack(Path("out") / known.other_packs["baseline: "])
+        assert [image["name"] for image in packed["images"]] == ["student"]
+        (image,) = next(r for r in known.runs if r.name == "student").images
+        linear, _ = imagefile.read(Path("out") / image.path)
+        assert np.abs(pixels(packed, 0) - linear).max() <= linear.max() / 65535
+    page = next(Path("out/cases").glob("ball*.html")).read_text("utf-8")
+    assert '"prefix":"baseline: ","aside":true' in page
+    next(Path("references").rglob("ball*.png")).unlink()
+    assert work("check", "ball", "-r", "student", "--run", "out").exit_code == 0
+    assert record.read_case(path).other_packs == {}
 
 
 def test_a_bug_regresses_and_fails(work: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,11 +17,8 @@ import pytest
 from harness import imagefile
 from harness import record as records
 from harness.record import CaseRecord
-from harness.renderers.registry import create
-from harness.report import write_report
 from harness.report.links import page_name
-from tests.fakes.student import student
-from tests.harness.tiny import run_tiny
+from tests.harness.tiny import report_of_dense_glass
 
 pytestmark = [
     pytest.mark.browser,
@@ -58,7 +55,7 @@ class Firefox:
 
 
 @pytest.fixture(scope="module")
-def firefox() -> Iterator[Firefox]:
+def firefox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
     marionette = pytest.importorskip(
         "marionette_driver.marionette", reason="uv pip install marionette-driver"
     )
@@ -67,7 +64,8 @@ def firefox() -> Iterator[Firefox]:
         pytest.skip("no Firefox: sudo apt-get install firefox-esr")
     # Beside the program itself, and not a link to it, lies what it is made of.
     binary = str(Path(program).resolve())
-    driver = marionette.Marionette(bin=binary, headless=True, startup_timeout=120)
+    log = str(tmp_path_factory.mktemp("firefox") / "gecko.log")
+    driver = marionette.Marionette(bin=binary, headless=True, gecko_log=log, startup_timeout=120)
     try:
         driver.start_session()
         yield Firefox(driver)
@@ -77,11 +75,7 @@ def firefox() -> Iterator[Firefox]:
 
 @pytest.fixture(scope="module")
 def case(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, CaseRecord]:
-    root = tmp_path_factory.mktemp("run")
-    tracer = create("tracer")
-    dense = ("mu = ior_i / ior_t", "mu = ior_i / (1.01 * ior_t)")
-    run_tiny(root, tracer, student(dense), cases=["slab*thickness=1]"], helper=tracer)
-    write_report(root)
+    root = report_of_dense_glass(tmp_path_factory.mktemp("run"), "slab*thickness=1]")
     (record,) = map(records.read_case, (root / "records").glob("*.json"))
     return root, record
 

@@ -20,12 +20,10 @@ from harness import imagefile
 from harness import record as records
 from harness.measure import images
 from harness.record import CaseRecord
-from harness.renderers.registry import create
 from harness.report import pack, write_report
 from harness.report.links import page_name
-from tests.fakes.student import student
 from tests.harness.report_fixture import make_run, write_run
-from tests.harness.tiny import run_tiny
+from tests.harness.tiny import report_of_dense_glass
 from tests.harness.unpack import floats, read_pack
 
 pytestmark = pytest.mark.browser
@@ -34,12 +32,7 @@ pytestmark = pytest.mark.browser
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ball, a slab and a critical angle by the tracer and a student whose glass is too dense."""
-    root = tmp_path_factory.mktemp("run")
-    tracer = create("tracer")
-    dense = ("mu = ior_i / ior_t", "mu = ior_i / (1.01 * ior_t)")
-    run_tiny(root, tracer, student(dense), cases=["ball*", "slab*", "tir*"], helper=tracer)
-    write_report(root)
-    return root
+    return report_of_dense_glass(tmp_path_factory.mktemp("run"), "ball*", "slab*", "tir*")
 
 
 def record_of(run: Path, name: str) -> CaseRecord:

@@ -10,11 +10,8 @@ pytest.importorskip("playwright.sync_api", reason="uv pip install playwright")
 
 from playwright.sync_api import Browser, Page, expect
 
-from harness.renderers.registry import create
-from harness.report import write_report
-from tests.fakes.student import student
 from tests.harness.test_viewer_browser import open_case, panes, record_of, wait_for_hash
-from tests.harness.tiny import run_tiny
+from tests.harness.tiny import report_of_dense_glass
 
 pytestmark = pytest.mark.browser
 
@@ -22,12 +19,7 @@ pytestmark = pytest.mark.browser
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ball, a slab and a sweep by the tracer and by a student whose glass is too dense."""
-    root = tmp_path_factory.mktemp("run")
-    tracer = create("tracer")
-    dense = ("mu = ior_i / ior_t", "mu = ior_i / (1.01 * ior_t)")
-    run_tiny(root, tracer, student(dense), cases=["ball*", "slab*", "snell*"], helper=tracer)
-    write_report(root)
-    return root
+    return report_of_dense_glass(tmp_path_factory.mktemp("run"), "ball*", "slab*", "snell*")
 
 
 # --- keys -----------------------------------------------------------------------------------------

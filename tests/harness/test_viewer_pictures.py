@@ -14,6 +14,7 @@ pytest.importorskip("playwright.sync_api", reason="uv pip install playwright")
 
 from playwright.sync_api import Page
 
+from harness import record as records
 from harness.record import CaseRecord, Verdict
 from harness.report import pack, write_report
 from harness.report.colours import NOT_FINITE, SCALE
@@ -61,6 +62,23 @@ def shown_at(page: Page, *steps: int) -> NDArray[np.int64]:
         list(steps),
     )
     return np.array(found)
+
+
+def test_approved_pictures_are_there_to_be_chosen(page: Page, tmp_path: Path) -> None:
+    grey = np.full((8, 8, 3), 0.5, np.float32)
+    address = page_of(tmp_path, {"tracer": grey, "povray": grey})
+    path = tmp_path / "records" / "given.json"
+    approved = pack.image("povray", "image", grey - np.float32(0.25))
+    pack.write(tmp_path / "data" / "given.baseline.js", "given", [approved])
+    others = {"baseline: ": "data/given.baseline.js"}
+    records.write(records.read_case(path).model_copy(update={"other_packs": others}), path)
+    write_report(tmp_path)
+    open_page(page, address)
+    assert page.locator(".pane canvas").count() == 2
+    open_page(page, address + "#mode=diff&a=povray&b=baseline:%20povray&every=0&pin=1,1")
+    label = page.locator(".pane canvas").get_attribute("aria-label")
+    assert label == "|A − B| of A povray and B baseline: povray"
+    assert page.locator("tr[data-off='povray'] td").first.inner_text() == "0.25"
 
 
 # --- FLIP -----------------------------------------------------------------------------------------

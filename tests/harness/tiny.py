@@ -8,6 +8,8 @@ from pathlib import Path
 from harness.plan import PreparedCase, prepare
 from harness.record import Check, Summary
 from harness.renderers.base import Renderer
+from harness.renderers.registry import create
+from harness.report import write_report
 from harness.run import run
 from harness.scene.load import find
 from tests.fakes.student import student
@@ -25,6 +27,18 @@ def run_tiny(
 ) -> Summary:
     """A run of the selected tiny cases, with the student as helper."""
     return run(prepared(*cases), list(renderers), helper or student(name="helper"), out)
+
+
+def report_of_dense_glass(out: Path, *cases: str) -> Path:
+    """The report of tiny cases by the tracer and by a student whose glass is too dense.
+
+    Returns `out`.
+    """
+    tracer = create("tracer")
+    dense = ("mu = ior_i / ior_t", "mu = ior_i / (1.01 * ior_t)")
+    run_tiny(out, tracer, student(dense), cases=cases, helper=tracer)
+    write_report(out)
+    return out
 
 
 def checks_of(summary: Summary, renderer: str | None = None) -> list[Check]:

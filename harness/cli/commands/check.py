@@ -45,6 +45,7 @@ def command(
     from harness.baseline.outcome import outcome, write_outcome
     from harness.baseline.run_folder import read_run
     from harness.baseline.select import of_run, selector
+    from harness.baseline.shown import show_pictures
     from harness.baseline.source import open_baselines
     from harness.baseline.trend import deviations, read_history, trends
     from harness.cli.baselines import default_baseline, show_states
@@ -57,7 +58,7 @@ def command(
     earlier = read_history(history) if history else []
     runs = [*(s for s in earlier if s.started != run.summary.started), run.summary]
     found = outcome(comparison, baselines.source, trends(deviations(runs)))
-    summary = write_outcome(run, comparison, found)
+    summary = write_outcome(show_pictures(run, baselines), comparison, found)
     index = write_report(folder)
     show_states(summary)
     click.echo(f"Report: {index}")

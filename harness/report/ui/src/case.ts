@@ -3,6 +3,7 @@
 export interface PackSource {
   readonly href: string;
   readonly prefix: string; // put before the names of its pictures: which run they are of
+  readonly aside: boolean; // its pictures are shown only where they are chosen
 }
 
 export interface CaseData {

@@ -12,7 +12,7 @@ export function firstPair(data: CaseData, names: readonly string[]): { a: string
   const base = names.find((name) => name === "tracer") ?? names[0] ?? "";
   const others = names.filter((name) => name !== base).sort((p, q) => rank(p) - rank(q));
   const a = others[0] ?? base;
-  const prefix = data.packs.find((pack) => pack.prefix)?.prefix;
+  const prefix = data.packs.find((pack) => pack.prefix && !pack.aside)?.prefix;
   const before = names.find((name) => prefix !== undefined && name === prefix + a);
   return { a, b: before ?? base };
 }

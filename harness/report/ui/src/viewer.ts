@@ -26,6 +26,7 @@ export class Viewer {
   readonly element: HTMLElement;
   private readonly images: ReadonlyMap<string, Image>;
   private readonly names: readonly string[];
+  private readonly own: readonly string[]; // those that are shown without being chosen
   private readonly initial: ViewState;
   private state: ViewState;
   private readonly figuresCache = new Map<string, Float32Array>();
@@ -52,8 +53,10 @@ export class Viewer {
   ) {
     this.images = new Map(images.map((image) => [image.name, image]));
     this.names = [...this.images.keys()];
+    const aside = data.packs.filter((pack) => pack.aside).map((pack) => pack.prefix);
+    this.own = this.names.filter((name) => !aside.some((prefix) => name.startsWith(prefix)));
     this.initial = {
-      mode: "side", ...firstPair(data, this.names), every: true, exposure: 0, encoding: "srgb",
+      mode: "side", ...firstPair(data, this.own), every: true, exposure: 0, encoding: "srgb",
       camera: null, pins: [],
     };
     this.state = fromHash(readAddress(), this.initial, this.names);
@@ -149,12 +152,12 @@ export class Viewer {
   /** The names of the pictures that have a pane of their own. */
   private subjects(): string[] {
     const { mode, a, b, every } = this.state;
-    if (mode === "side") return [...this.names];
+    if (mode === "side") return [...this.own];
     if (mode === "rays") {
       const names = [...new Set(this.rays.flatMap((r) => [...r.errors.keys()]))];
       return every || !names.includes(a) ? names : [a];
     }
-    if (MAPS[mode] && every) return this.names.filter((n) => n !== b && this.fits(n));
+    if (MAPS[mode] && every) return this.own.filter((n) => n !== b && this.fits(n));
     return a ? [a] : [];
   }
 
