@@ -10,6 +10,7 @@ from harness.scene.crosscheck import AIR
 from harness.scene.dispersion import abbe_number, index, wavelengths
 from harness.scene.findings import Attempts, Finding, SceneInvalid, input_error, quoted
 from harness.scene.load import LoadedCase
+from harness.scene.meshfile import parts_left_out
 from harness.scene.nesting import nested
 from harness.scene.resolved import ResolvedScene
 from harness.scene.shapes import rectangle, slab, solid_shape, surface_shape
@@ -70,6 +71,8 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
             attempts.attempt(("probes", k, "planes", i), rectangle, plane)
     camera = attempts.attempt(("camera",), _camera, case.camera)
     lights = [attempts.attempt(("lights", k), _light, light) for k, light in enumerate(case.lights)]
+    if not attempts.findings:
+        attempts.findings += parts_left_out(case, folder)
     attempts.raise_any()
     assert camera is not None
     surfaces = tuple(

@@ -147,10 +147,11 @@ class Icosphere(Placed):
 
 
 class MeshFile(Placed):
-    """A closed mesh from a PLY, OBJ or STL file beside the scene file."""
+    """A closed mesh from a PLY, OBJ or STL file beside the scene file; or one `part` of it."""
 
     type: Literal["mesh"]
     file: str
+    part: Annotated[str, Field(min_length=1, max_length=256)] | None = None
     scale: Positive = 1.0
     translate: Vec3 = (0, 0, 0)
     smooth: bool = False

@@ -77,7 +77,7 @@ def solid_shape(shape: model.SolidShape, folder: Path) -> resolved.SolidShape:
         case model.Icosphere():
             return _icosphere(shape)
         case model.MeshFile() | model.MeshData():
-            return _closed(_mesh(shape, folder), shape)
+            return _closed(_mesh(shape, folder), shape, folder)
 
 
 def surface_shape(shape: model.SurfaceShape, folder: Path) -> resolved.SurfaceShape:
@@ -285,7 +285,7 @@ def _mesh(shape: model.MeshFile | model.MeshData, folder: Path) -> resolved.Mesh
     if isinstance(shape, model.MeshFile):
         from harness.scene.meshfile import read_mesh
 
-        vertices, triangles = read_mesh(folder, shape.file)
+        vertices, triangles = read_mesh(folder, shape.file, shape.part)
         vertices, origin = vertices * shape.scale, _vec(shape.translate)
     else:
         vertices, triangles = _written_out(shape)
@@ -307,15 +307,23 @@ def _written_out(shape: model.MeshData) -> tuple[Points, Triangles]:
     return vertices, np.array(shape.triangles, dtype=np.int64)
 
 
-def _closed(mesh: resolved.Mesh, shape: model.MeshFile | model.MeshData) -> resolved.Mesh:
+def _closed(
+    mesh: resolved.Mesh, shape: model.MeshFile | model.MeshData, folder: Path
+) -> resolved.Mesh:
     """The mesh where it bounds one solid; raises SceneInvalid."""
     from harness.scene.mesh import closed_solid_problems
+    from harness.scene.meshfile import hint_of_parts
 
     problems = closed_solid_problems(np.array(mesh.vertices), np.array(mesh.triangles))
     if problems:
-        key = ("file",) if isinstance(shape, model.MeshFile) else ("triangles",)
+        key, expected = ("triangles",), None
+        if isinstance(shape, model.MeshFile):
+            key, expected = ("file",), hint_of_parts(shape, folder)
         raise SceneInvalid(
-            *(Finding(key, f"not the surface of one solid: {problem}") for problem in problems)
+            *(
+                Finding(key, f"not the surface of one solid: {problem}", None, expected)
+                for problem in problems
+            )
         )
     return mesh
 

@@ -25,6 +25,7 @@ from harness.scene import model
 from harness.scene.expressions import CONSTANTS, FUNCTIONS
 from harness.scene.load import load_cases
 from harness.scene.resolve import resolve
+from tests.harness.test_mesh_parts import FILE as TWO
 from tests.strategies import to_toml
 
 TEXT = (Path(__file__).parents[2] / "docs" / "scene-format.md").read_text(encoding="utf-8")
@@ -32,6 +33,7 @@ BLOCKS = {
     TEXT.count("\n", 0, match.start()) + 1: (match[1], match[2])
     for match in re.finditer(r"^```(.*)\n((?:.*\n)*?)^```$", TEXT, re.MULTILINE)
 }
+
 TETRAHEDRON = """\
 ply
 format ascii 1.0
@@ -74,6 +76,7 @@ def test_blocks_load(tmp_path: Path, line: int) -> None:
     white = np.full((4, 4, 3), 255, dtype=np.uint8)
     (tmp_path / "photograph.png").write_bytes(imagecodecs.png_encode(white))
     (tmp_path / "tetrahedron.ply").write_text(TETRAHEDRON)
+    (tmp_path / "two.obj").write_text(TWO)
     block = tomllib.loads(BLOCKS[line][1])
     path = tmp_path / "scene.toml"
     path.write_text(to_toml(block if "format" in block else {**REST, **block}), encoding="utf-8")
