@@ -13,7 +13,7 @@ from harness.measure.images import Pixels
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS
 from harness.measure.statistics import Noise, binned
-from harness.scene.resolved import ResolvedScene
+from harness.scene.resolved import Panorama, ResolvedScene
 from harness.truth.camera import primary_rays
 from harness.truth.paths import ClosedForm
 from harness.truth.tree import light_around
@@ -25,7 +25,8 @@ FLOAT32 = float(np.finfo(np.float32).eps)
 
 def is_furnace(scene: ResolvedScene) -> bool:
     """Whether the scene is nothing but solids before a background."""
-    return bool(scene.solids) and not scene.surfaces and not scene.lights
+    alike = not isinstance(scene.background, Panorama)
+    return alike and bool(scene.solids) and not scene.surfaces and not scene.lights
 
 
 def energy(
@@ -40,7 +41,7 @@ def energy(
         raise Unmeasurable("a furnace tells nothing of glass that absorbs")
     if not np.isfinite(picture).all():
         raise Unmeasurable("the picture holds values that are not finite")
-    true = np.array(scene.background)
+    true = np.array(scene.background)  # no panorama: see is_furnace
     depth, least = scene.transport.max_depth, scene.transport.min_weight
     light = light_around(ClosedForm(scene), primary_rays(scene), depth, least)
     measured = picture.reshape(-1, 3).astype(np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.images import Pixels
+from harness.measure.panorama import panorama_radiance
 from harness.measure.pictures import geometric_error
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS
@@ -23,10 +24,12 @@ from harness.scene.resolved import (
     DirectionalLight,
     Emissive,
     Orthographic,
+    Panorama,
     Pattern,
     Ramp,
     Rectangle,
     ResolvedScene,
+    Rgb,
     Surface,
     Translucent,
 )
@@ -55,9 +58,16 @@ def true_picture(scene: ResolvedScene) -> tuple[Float, Float]:
             through[rows] *= passes
             edge[rows] = np.minimum(edge[rows], distance)
         reached = np.where(which >= 0, t, np.inf)
-    radiance += through * np.array(scene.background)
+    radiance += through * _around(scene.background, rays.directions)
     shape = (scene.film.height, scene.film.width)
     return radiance.reshape(*shape, 3), edge.reshape(shape)
+
+
+def _around(background: Rgb | Panorama, directions: Float) -> Float:
+    """The radiance that comes from behind everything."""
+    if isinstance(background, Panorama):
+        return panorama_radiance(background, directions)
+    return np.array(background)
 
 
 def _rectangle(surface: Surface) -> Rectangle:

@@ -46,6 +46,7 @@ class Capability(enum.StrEnum):
     THIN_LENS = "thin-lens"  # cameras with depth of field, as the mean over the lens says
     TRANSLUCENT = "translucent"
     PICTURE = "picture"
+    ENVIRONMENT = "environment"  # a panorama around everything
     ABSORPTION = "absorption"
     DISPERSION = "dispersion"  # by itself, all wavelengths in one picture
     FRESNEL = "fresnel"  # R and T weigh the lobes, unpolarised at each interface

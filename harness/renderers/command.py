@@ -37,6 +37,7 @@ USUAL_CLAIMS = frozenset(Capability) - {
     Capability.LOBE_SWITCH,
     Capability.THIN_SLAB,
     Capability.PRIORITY,
+    Capability.ENVIRONMENT,
     Capability.RADIANCE_N2,
 }
 

@@ -52,6 +52,7 @@ STOCK_CAPABILITIES = frozenset(
         Capability.DIRECTIONAL_LIGHT,
         Capability.TRANSLUCENT,
         Capability.PICTURE,
+        Capability.ENVIRONMENT,
         Capability.ABSORPTION,
         Capability.FRESNEL,
         Capability.NESTED,

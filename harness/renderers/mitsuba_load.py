@@ -55,7 +55,10 @@ def _plain(mi: Any, node: Any, media: dict[str, Any]) -> Any:
         if key in ("to_world", "to_uv"):
             result[key] = mi.ScalarTransform4f(value)
         elif key == "pixels":
-            result["data"] = mi.TensorXf(value)
+            if node["type"] == "envmap":
+                result["bitmap"] = mi.Bitmap(value)
+            else:
+                result["data"] = mi.TensorXf(value)
         else:
             result[key] = _plain(mi, value, media)
     return result

@@ -97,6 +97,7 @@ class PovRayRenderer:
             Capability.DIRECTIONAL_LIGHT,
             Capability.TRANSLUCENT,
             Capability.PICTURE,
+            Capability.ENVIRONMENT,
             Capability.ABSORPTION,
             Capability.FRESNEL,
             Capability.NESTED,

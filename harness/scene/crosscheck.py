@@ -46,6 +46,7 @@ def cross_findings(document: Table, renderers: Collection[str] = ()) -> list[Fin
         *_repeated_names(document),
         *_media(document),
         *_dispersion(document),
+        *_environment(document),
         *_variants(document),
         *_checks(document, registered_renderers().union(renderers)),
     ]
@@ -128,6 +129,18 @@ def _dispersion(document: Table) -> Iterator[Finding]:
             message = "has no truth where renderers disperse by themselves"
             expected = "solids before a background, or no transport.dispersion"
             yield Finding((key,), message, None, expected)
+
+
+def _environment(document: Table) -> Iterator[Finding]:
+    """Whether what is behind everything is said once, and stays where it is."""
+    if "environment" not in document:
+        return
+    if "background" in document:
+        yield Finding(("background",), "there is an environment, too", None, "one of the two")
+    for index, variant in _rows(document, "variants"):
+        if variant.get("rotate"):
+            message = "an environment cannot be turned"
+            yield Finding(("variants", index, "rotate"), message, None, "no environment")
 
 
 def _variants(document: Table) -> Iterator[Finding]:

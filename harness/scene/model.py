@@ -77,6 +77,17 @@ class Picture(Strict):
     encoding: Literal["srgb", "linear"] = "srgb"
 
 
+class Environment(Strict):
+    """What rays see that leave the scene: a panorama of all around, in an image file.
+
+    Its middle lies along -z, +x is to the right of it, and its top row is above (+y): the whole
+    circle across, and half of one from top to bottom.
+    """
+
+    file: str
+    encoding: Literal["srgb", "linear"] = "srgb"
+
+
 Pattern = Annotated[Constant | Checker | Ramp | Picture, Field(discriminator="type")]
 
 
@@ -299,6 +310,7 @@ class Case(Strict):
     film: Film = Film()
     camera: Camera
     background: Rgb = (0, 0, 0)
+    environment: Environment | None = None
     wavelength: Wavelength = 587.5618
     spectrum: Spectrum | None = None
     media: dict[Name, Medium] = Field(default_factory=dict)

@@ -70,6 +70,7 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
         for i, plane in enumerate(probe.planes):
             attempts.attempt(("probes", k, "planes", i), rectangle, plane)
     camera = attempts.attempt(("camera",), _camera, case.camera)
+    background = attempts.attempt(("environment",), _environment, case.environment, folder)
     lights = [attempts.attempt(("lights", k), _light, light) for k, light in enumerate(case.lights)]
     if not attempts.findings:
         attempts.findings += parts_left_out(case, folder)
@@ -92,7 +93,7 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
         ),
         surfaces=surfaces,
         lights=tuple(light for light in lights if light is not None),
-        background=case.background,
+        background=background if background is not None else case.background,
         transport=resolved.Transport(
             max_depth=case.transport.max_depth, min_weight=case.transport.min_weight
         ),
@@ -163,6 +164,15 @@ def _camera(camera: model.Camera) -> resolved.Camera:
                 "lens_samples": camera.lens_samples,
             }
             return resolved.ThinLens.model_validate({**stand, "tan_half_fov_x": half, **lens})
+
+
+def _environment(environment: model.Environment | None, folder: Path) -> resolved.Panorama | None:
+    if environment is None:
+        return None
+    from harness.scene.pictures import read_picture
+
+    seen = read_picture(folder, environment.file, environment.encoding)
+    return resolved.Panorama(width=seen.width, height=seen.height, pixels=seen.pixels)
 
 
 def _light(light: model.Light) -> resolved.Light:

@@ -209,6 +209,20 @@ class Picture(Frozen):
     pixels: str
 
 
+class Panorama(Frozen):
+    """What lies in each direction d, d unit: equirectangular, `pixels` as of a picture.
+
+    u = 1/2 + atan2(d_x, -d_z) / 2 pi and v = 1 - acos(d_y) / pi. Radiance is bilinear between the
+    middles of the texels, across the seam at u = 0 too, and does not change above the middles of
+    the first row and below those of the last.
+    """
+
+    type: Literal["panorama"] = "panorama"
+    width: int
+    height: int
+    pixels: str
+
+
 Pattern = Annotated[Constant | Checker | Ramp | PositionCode | Picture, Field(discriminator="type")]
 
 
@@ -363,5 +377,5 @@ class ResolvedScene(Frozen):
     solids: tuple[Solid, ...] = ()
     surfaces: tuple[Surface, ...] = ()
     lights: tuple[Light, ...] = ()
-    background: Rgb = (0.0, 0.0, 0.0)
+    background: Rgb | Panorama = (0.0, 0.0, 0.0)
     transport: Transport

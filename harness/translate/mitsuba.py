@@ -8,7 +8,8 @@ The description is the dict that ``mitsuba.load_dict`` takes, with these stand-i
 * ``to_world`` and ``to_uv`` are 4 x 4 nested lists;
 * a ``mesh`` has ``vertices`` (n, 3) and optionally ``normals`` (n, 3) and ``texcoords`` (n, 2),
   float32, and ``triangles`` (m, 3) uint32;
-* a ``bitmap`` has ``pixels`` (h, w, 3) float32, row 0 at v = 0, the bottom.
+* a ``bitmap`` has ``pixels`` (h, w, 3) float32, row 0 at v = 0, the bottom; an ``envmap`` has
+  them with row 0 at the top.
 
 Two things that Mitsuba does differently from the scene's definition, on purpose left to it:
 radiance scales with the square of the index (it cancels where camera and emitter stand in the same
@@ -26,7 +27,7 @@ from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 from harness.translate.mitsuba_scale import length_scale, scaled
 from harness.translate.mitsuba_shapes import Node, affine, parts, round_mesh
-from harness.translate.mitsuba_textures import code_texture, texture
+from harness.translate.mitsuba_textures import code_texture, environment, texture
 
 # Beyond this many bounces Mitsuba plays Russian roulette, which would only add noise.
 RR_DEPTH = 1000
@@ -61,7 +62,9 @@ def describe(
         node |= _surface(f"surface_{k}", surface)
     for k, light in enumerate(scene.lights):
         node[f"light_{k}"] = _light(light)
-    if any(scene.background):
+    if isinstance(scene.background, rs.Panorama):
+        node["background"] = environment(scene.background)
+    elif any(scene.background):
         node["background"] = {"type": "constant", "radiance": rgb(scene.background)}
     return node
 

@@ -5,14 +5,13 @@ Mitsuba's own checkerboard refuses radiance above 1, and its colours go through 
 
 from __future__ import annotations
 
-import base64
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.scene import resolved as rs
 from harness.translate.mitsuba_shapes import Matrix, Node, affine
+from harness.translate.texels import knots_of, radiance_of
 
 CODE_TEXTURE = "snellcheck_position_code"
 
@@ -30,9 +29,7 @@ def texture(pattern: rs.Checker | rs.Ramp | rs.Picture) -> Node:
         case rs.Ramp():
             return _ramp([[pattern.start, pattern.start], [pattern.end, pattern.end]])
         case rs.Picture():
-            return _bitmap(
-                picture_pixels(pattern)[::-1], "nearest", "clamp", _uv_map((1, 1), (0, 0))
-            )
+            return _bitmap(radiance_of(pattern)[::-1], "nearest", "clamp", _uv_map((1, 1), (0, 0)))
 
 
 def _bitmap(pixels: Any, filter_type: str, wrap_mode: str, to_uv: Matrix) -> Node:
@@ -56,11 +53,13 @@ def _uv_map(scale: tuple[float, float], offset: tuple[float, float]) -> Matrix:
     return affine((scale[0], 0, 0), (0, scale[1], 0), (0, 0, 1), (*offset, 0))
 
 
-def picture_pixels(pattern: rs.Picture) -> NDArray[np.float32]:
-    """Radiance (height, width, 3), row 0 at the top."""
-    values = np.frombuffer(base64.b64decode(pattern.pixels), "<u2")
-    pixels = values.reshape(pattern.height, pattern.width, 3) / np.float64(65535)
-    return pixels.astype(np.float32)
+def environment(panorama: rs.Panorama) -> Node:
+    """Mitsuba's panorama begins at -z, where ours has its middle, and its rows at the poles."""
+    return {
+        "type": "envmap",
+        "pixels": np.ascontiguousarray(knots_of(panorama), np.float32),
+        "to_world": affine((-1, 0, 0), (0, 1, 0), (0, 0, -1), (0, 0, 0)),
+    }
 
 
 def code_texture(code: rs.PositionCode) -> Node:

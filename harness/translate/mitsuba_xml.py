@@ -29,7 +29,7 @@ _TAGS = {
     "medium": ("homogeneous",),
     "bsdf": ("dielectric", "diffuse", "conductor", "twosided", "blendbsdf", "thindielectric"),
     "texture": ("bitmap",),
-    "emitter": ("area", "point", "constant"),
+    "emitter": ("area", "point", "constant", "envmap"),
     "shape": ("sphere", "rectangle", "disk", "cylinder", "mesh"),
 }
 _TAG = {plugin: tag for tag, plugins in _TAGS.items() for plugin in plugins}
@@ -68,7 +68,7 @@ def _plugin(name: str, node: Node, folder: Path, naming: str, trail: str = "") -
         _write_ply(node, folder / f"{trail}.ply")
         _value(element, "string", "filename", f"{trail}.ply")
         _value(element, "boolean", "face_normals", str("normals" not in node).lower())
-    if kind == "bitmap":
+    if kind in ("bitmap", "envmap"):
         write_exr(folder / f"{trail}.exr", node["pixels"])
         _value(element, "string", "filename", f"{trail}.exr")
     for key, value in node.items():

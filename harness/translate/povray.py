@@ -26,12 +26,12 @@ What POV-Ray does otherwise than a scene defines, and what follows from it
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
@@ -41,6 +41,7 @@ from harness.translate.mitsuba_scale import scaled
 from harness.translate.povray_contact import within_group
 from harness.translate.povray_fit import SHADOW_FLOOR, exposure, extent, length_scale
 from harness.translate.povray_shapes import number, region_text, rgb, shape_text, vector
+from harness.translate.texels import levels_of
 
 MAX_TRACE_LEVEL = 256
 # Without a floor for weights POV-Ray follows light between parallel faces for ever.
@@ -118,7 +119,7 @@ class Writer:
     def blocks(self) -> Iterator[str]:
         yield self._settings()
         yield _camera(self.scene)
-        yield f"background {{ {self._radiance(self.scene.background)} }}"
+        yield self._background(self.scene.background)
         if any(self.scene.media[0].absorption):
             yield self.absorption(self.scene.media[0].absorption)
         for light in self.scene.lights:
@@ -297,12 +298,31 @@ class Writer:
         )
 
     def _picture(self, pattern: rs.Picture) -> str:
-        """Texels as a 16-bit PPM, which is big-endian. POV-Ray too has its first row at v = 1."""
+        return f'image_map {{ ppm "{self._attached(levels_of(pattern))}" gamma 1.0 }}'
+
+    def _background(self, background: rs.Rgb | rs.Panorama) -> str:
+        """A panorama wraps round in u, and has its first and last row twice, not to wrap in v.
+
+        The warp's u begins at x and grows towards z.
+        """
+        if not isinstance(background, rs.Panorama):
+            return f"background {{ {self._radiance(background)} }}"
+        levels = levels_of(background)
+        name = self._attached(np.concatenate([levels[:1], levels, levels[-1:]]))
+        rows = background.height
+        return (
+            f'sky_sphere {{ pigment {{ image_map {{ ppm "{name}" gamma 1.0 interpolate 2 }} '
+            f"scale <1, {rows + 2:d}/{rows:d}, 1> translate <0.25, -1/{rows:d}, 0> "
+            f"warp {{ spherical }} }} emission rgb {number(self.exposure)} }}"
+        )
+
+    def _attached(self, levels: NDArray[np.uint16]) -> str:
+        """The name of a 16-bit PPM, big-endian. POV-Ray too has its first row at v = 1."""
         name = f"picture-{len(self.attachments):d}.ppm"
-        texels = np.frombuffer(base64.b64decode(pattern.pixels), "<u2")
-        head = f"P6\n{pattern.width:d} {pattern.height:d}\n65535\n".encode()
-        self.attachments[name] = head + texels.astype(">u2").tobytes()
-        return f'image_map {{ ppm "{name}" gamma 1.0 }}'
+        height, width, _ = levels.shape
+        head = f"P6\n{width:d} {height:d}\n65535\n".encode()
+        self.attachments[name] = head + levels.astype(">u2").tobytes()
+        return name
 
     def _radiance(self, radiance: Sequence[float]) -> str:
         return rgb(radiance, self.exposure)

@@ -112,7 +112,9 @@ def exposure(scene: rs.ResolvedScene) -> float:
     weights sum to at most 1), so the brightest thing that emits or is lit bounds every pixel.
     Raises RendererUnsupported where a light touches a lit surface: nothing bounds its radiance.
     """
-    bounds = [max(scene.background), *(_brightest(scene, surface) for surface in scene.surfaces)]
+    around = scene.background
+    furthest = 1.0 if isinstance(around, rs.Panorama) else max(around)
+    bounds = [furthest, *(_brightest(scene, surface) for surface in scene.surfaces)]
     brightest = max(bounds)
     return 1.0 / brightest if brightest > 0 else 1.0
 

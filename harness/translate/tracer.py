@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 
 import numpy as np
@@ -15,6 +14,7 @@ import tracer.shapes
 import tracer.solids
 from harness.scene import resolved
 from harness.scene.regions import along, opposite
+from harness.translate.texels import radiance_of
 
 
 def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
@@ -37,7 +37,7 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
             else tracer.scene.DirectionalLight(light.direction, light.irradiance)
             for light in scene.lights
         ),
-        background=scene.background,
+        background=_background(scene.background),
         ambient=media[0],
         transport=tracer.scene.Transport(
             max_depth=transport.max_depth,
@@ -46,6 +46,14 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
             transmission=transport.transmission,
         ),
     )
+
+
+def _background(
+    background: resolved.Rgb | resolved.Panorama,
+) -> resolved.Rgb | tracer.patterns.Picture:
+    if isinstance(background, resolved.Panorama):
+        return tracer.patterns.Picture(radiance_of(background))
+    return background
 
 
 def _camera(camera: resolved.Camera) -> tracer.camera.Camera:
@@ -149,7 +157,4 @@ def _pattern(pattern: resolved.Pattern) -> tracer.patterns.Pattern:
         case resolved.PositionCode():
             return tracer.patterns.PositionCode(pattern.axis, pattern.cells, pattern.amplitude)
         case resolved.Picture():
-            levels = np.frombuffer(base64.b64decode(pattern.pixels), "<u2")
-            return tracer.patterns.Picture(
-                levels.reshape(pattern.height, pattern.width, 3) / 65535.0
-            )
+            return tracer.patterns.Picture(radiance_of(pattern))
