@@ -172,23 +172,38 @@ def against_truth(
     extent = float(np.abs(np.array(scene.camera.origin)).max()) + 1
     stray = geometric_error(extent, len(scene.surfaces), precision.arithmetic)
     if noise is not None:
+        if isinstance(scene.background, Panorama):
+            raise Unmeasurable("the mean of a panorama over a pixel has no closed form")
         rows = np.flatnonzero(edge.ravel() > footprint(scene))
         return binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise)
     keep = edge > stray
     error = np.abs(picture.astype(np.float64) - true).max(axis=-1)
-    tolerance = quantum + ROUNDINGS * (len(scene.surfaces) + 1) * precision.arithmetic / 2 * float(
-        true.max()
-    )
+    roundings = ROUNDINGS * (len(scene.surfaces) + 1) * precision.arithmetic / 2
+    tolerance = quantum + roundings * (float(true.max()) + _steepness(scene))
     y, x = np.unravel_index(int(np.where(keep, error, -1).argmax()), error.shape)
     channel = int(np.abs(picture[y, x].astype(np.float64) - true[y, x]).argmax())
     return Comparison(
         float(picture[y, x, channel]), float(true[y, x, channel]), tolerance,
         bool(error[keep].max() <= tolerance),
-        "quantum of the image + 8 eps per surface",
+        "quantum of the image + 8 eps per surface, and per radian of a panorama",
         detail={"max": float(error[keep].max()), "rms": float(np.sqrt((error[keep] ** 2).mean())),
                 "excluded_grazing": int((~keep).sum()), "worst_pixel_x": int(x),
                 "worst_pixel_y": int(y)},
     )  # fmt: skip
+
+
+def _steepness(scene: ResolvedScene) -> float:
+    """By how much radiance a panorama changes per radian, anywhere in the picture."""
+    if not isinstance(scene.background, Panorama):
+        return 0.0
+    d, step = primary_rays(scene).directions, 1e-6
+    here = panorama_radiance(scene.background, d)
+    changes = [0.0]
+    for axis in np.eye(3):
+        there = d + step * axis
+        there /= np.linalg.norm(there, axis=1, keepdims=True)
+        changes.append(float(np.abs(panorama_radiance(scene.background, there) - here).max()))
+    return float(np.sqrt(3)) * max(changes) / step
 
 
 def footprint(scene: ResolvedScene) -> float:
