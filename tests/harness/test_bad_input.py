@@ -34,14 +34,12 @@ shape = { type = "sphere", radius = 1 }
 observable = "radiance"
 """
 ALSO = '\n[[solids]]\nname = "also"\nmedium = "glass"\nshape = {}\n\n[[checks]]'
-OPEN = '{ type = "triangles", vertices = [%s], triangles = [%s] }' % (
-    "[0, 3, 0], [1, 3, 0], [0, 4, 0], [0, 3, 1], [2, 4, 2]",
-    "[0, 2, 1], [0, 1, 3], [1, 2, 3], [1, 4, 2]",
-)
+CORNERS = "[0, 3, 0], [1, 3, 0], [0, 4, 0], [0, 3, 1], [2, 4, 2]"
+FACES = "[0, 2, 1], [0, 1, 3], [1, 2, 3], [1, 4, 2]"
+OPEN = f'{{ type = "triangles", vertices = [{CORNERS}], triangles = [{FACES}] }}'
 NO_AXIS = '{ type = "cylinder", center = [3, 0, 0], axis = [0, 0, 0], radius = 1, height = 1 }'
-NO_TURN = '{ type = "box", center = [3, 0, 0], size = [1, 1, 1], rotate = [%s] }' % (
-    "{ axis = [0, 0, 0], angle = 1 }"
-)
+TURN = "{ axis = [0, 0, 0], angle = 1 }"
+NO_TURN = f'{{ type = "box", center = [3, 0, 0], size = [1, 1, 1], rotate = [{TURN}] }}'
 NOWHERE = '[[lights]]\ntype = "directional"\ndirection = [0, 0, 0]\nirradiance = [1, 1, 1]\n'
 
 
