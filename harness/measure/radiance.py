@@ -167,6 +167,8 @@ def against_truth(
     true, edge = true_picture(scene)
     if picture.shape != true.shape:
         raise Unmeasurable(f"the picture is {picture.shape}, expected {true.shape}")
+    if scene.film.samples > 1:
+        raise Unmeasurable("the truth is what the centres of pixels see, and not what samples do")
     if not np.isfinite(picture).all():
         raise Unmeasurable("the picture holds values that are not finite")
     extent = float(np.abs(np.array(scene.camera.origin)).max()) + 1

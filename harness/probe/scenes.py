@@ -10,6 +10,7 @@ from __future__ import annotations
 from harness.scene.resolved import (
     Constant,
     Emissive,
+    Film,
     Mirror,
     PositionCode,
     Ramp,
@@ -91,6 +92,7 @@ def _isolated(
             "surfaces": (*kept, probe_plane),
             "lights": (),
             "background": (0.0, 0.0, 0.0),
+            "film": Film(width=scene.film.width, height=scene.film.height),
             "transport": scene.transport.model_copy(update=transport),
         }
     )

@@ -46,6 +46,7 @@ class Capability(enum.StrEnum):
     THIN_LENS = "thin-lens"  # cameras with depth of field, as the mean over the lens says
     TRANSLUCENT = "translucent"
     PICTURE = "picture"
+    SAMPLING = "sampling"  # pixels that are weighed means of samples, as the film says
     ENVIRONMENT = "environment"  # a panorama around everything
     ABSORPTION = "absorption"
     DISPERSION = "dispersion"  # by itself, all wavelengths in one picture

@@ -38,6 +38,7 @@ USUAL_CLAIMS = frozenset(Capability) - {
     Capability.THIN_SLAB,
     Capability.PRIORITY,
     Capability.ENVIRONMENT,
+    Capability.SAMPLING,
     Capability.RADIANCE_N2,
 }
 

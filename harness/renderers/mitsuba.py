@@ -32,6 +32,7 @@ from harness.renderers.base import (
     Rays,
     RenderSettings,
 )
+from harness.renderers.developing import developed, of_samples
 from harness.renderers.mitsuba_load import Live, load
 from harness.scene import resolved as rs
 from harness.scene.resolved import ResolvedScene
@@ -69,6 +70,7 @@ EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
     Capability.CONE,
     Capability.CSG,
     Capability.PRIORITY,
+    Capability.SAMPLING,
 }
 
 # An ordinary image is the mean of this many renders with seeds of their own, which tell its
@@ -245,6 +247,8 @@ class ExactEngine(_Engine):
         from harness.renderers.mitsuba_image import render
         from harness.renderers.mitsuba_sensor import centre_rays
 
+        if scene.film.samples > 1:
+            return developed(self.render(of_samples(scene), settings), scene.film)
         start = time.perf_counter()
         live = self._load(scene, settings)
         rays = centre_rays(live.scene, scene)

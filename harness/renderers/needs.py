@@ -78,6 +78,8 @@ def _all_reasons(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
 
 
 def _of_surroundings(scene: ResolvedScene) -> Iterator[tuple[Capability, str]]:
+    if scene.film.samples > 1:
+        yield Capability.SAMPLING, "pixels are means of samples"
     if isinstance(scene.background, resolved.Panorama):
         yield Capability.ENVIRONMENT, "a panorama is around everything"
     if any(scene.media[0].absorption):

@@ -27,6 +27,7 @@ from harness.fingerprint import code_digest, combined, file_digest, versions
 from harness.renderers.base import Capability, Health, Image, RenderSettings
 from harness.renderers.confinement import Confinement
 from harness.renderers.delivery import delivered
+from harness.renderers.developing import developed, of_samples
 from harness.renderers.needs import require
 from harness.renderers.process import Finished, run_limited
 from harness.renderers.proof import proof_scene, prove
@@ -98,6 +99,7 @@ class PovRayRenderer:
             Capability.TRANSLUCENT,
             Capability.PICTURE,
             Capability.ENVIRONMENT,
+            Capability.SAMPLING,
             Capability.ABSORPTION,
             Capability.FRESNEL,
             Capability.NESTED,
@@ -135,6 +137,8 @@ class PovRayRenderer:
 
     def render(self, scene: rs.ResolvedScene, settings: RenderSettings) -> Image:
         require(scene, self.name, self.capabilities)
+        if scene.film.samples > 1:
+            return developed(self.render(of_samples(scene), settings), scene.film)
         path = self._path()
         translated = self.translate(scene)
         with tempfile.TemporaryDirectory(prefix="snellcheck-povray-") as name:
@@ -171,6 +175,7 @@ class PovRayRenderer:
     def emit(self, scene: rs.ResolvedScene, folder: Path) -> Path:
         """Writes `scene.pov`, its pictures, and `scene.ini`: ``povray scene.ini`` renders them."""
         folder.mkdir(parents=True, exist_ok=True)
+        scene = of_samples(scene)
         return _write(self.translate(scene), scene, folder)
 
     def _path(self) -> str:

@@ -32,12 +32,14 @@ class TracerEngine:
 
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """Raises RendererFailed for a scene that the tracer refuses."""
-        from harness.translate.tracer import translate
+        from harness.translate.tracer import sampling, translate
 
         start = time.perf_counter()
         film = scene.film
         try:
-            image = tracer.render(translate(scene), film.width, film.height, settings.threads)
+            image = tracer.render(
+                translate(scene), film.width, film.height, settings.threads, sampling(film)
+            )
         except tracer.SceneError as error:
             raise RendererFailed(f"the tracer refuses the scene: {error}") from error
         return Image(

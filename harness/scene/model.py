@@ -203,12 +203,34 @@ Camera = Annotated[
 ]
 
 
+class BoxFilter(Strict):
+    """The mean over the pixel's own area."""
+
+    type: Literal["box"]
+
+
+class GaussianFilter(Strict):
+    """`sigma` in pixels."""
+
+    type: Literal["gaussian"]
+    sigma: Annotated[float, Field(gt=0, le=16, allow_inf_nan=False)] = 0.5
+
+
+Filter = Annotated[BoxFilter | GaussianFilter, Field(discriminator="type")]
+
+
 class Film(Strict):
-    """At quality `normal`; `draft` halves and `high` doubles it where `scalable`."""
+    """At quality `normal`; `draft` halves and `high` doubles it where `scalable`.
+
+    A pixel is what its centre sees, or of `samples` squared evenly spread in each pixel the mean
+    that is weighed by `filter`. Probes go through pixel centres always.
+    """
 
     width: Annotated[int, Field(ge=1, le=8192)] = 256
     height: Annotated[int, Field(ge=1, le=8192)] = 256
     scalable: bool = True
+    samples: Annotated[int, Field(ge=1, le=16)] = 1
+    filter: Filter = BoxFilter(type="box")
 
 
 class Transport(Strict):

@@ -83,7 +83,7 @@ def _resolve(case: model.Case, folder: Path) -> ResolvedScene:
     )
     scene = ResolvedScene(
         metres_per_unit=case.metres_per_unit,
-        film=resolved.Film(width=case.film.width, height=case.film.height),
+        film=_film(case.film),
         camera=camera,
         media=media,
         solids=tuple(
@@ -164,6 +164,19 @@ def _camera(camera: model.Camera) -> resolved.Camera:
                 "lens_samples": camera.lens_samples,
             }
             return resolved.ThinLens.model_validate({**stand, "tan_half_fov_x": half, **lens})
+
+
+def _film(film: model.Film) -> resolved.Film:
+    gaussian = film.filter if isinstance(film.filter, model.GaussianFilter) else None
+    if gaussian is not None and film.samples == 1:
+        message = "weighs samples, of which there is one at the pixel's centre"
+        raise SceneInvalid(Finding(("film", "filter"), message, None, "film.samples of 2 or more"))
+    return resolved.Film(
+        width=film.width,
+        height=film.height,
+        samples=film.samples,
+        sigma=None if gaussian is None else gaussian.sigma,
+    )
 
 
 def _environment(environment: model.Environment | None, folder: Path) -> resolved.Panorama | None:

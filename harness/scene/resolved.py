@@ -349,8 +349,18 @@ Light = Annotated[PointLight | DirectionalLight, Field(discriminator="type")]
 
 
 class Film(Frozen):
+    """A pixel is the weighed mean of samples, of which each pixel has `samples` squared.
+
+    They are the middles of as many equal squares; with one, a pixel is what its centre sees. With
+    `sigma`, in pixels, the weight of a sample is ``max(0, exp(-r^2 / 2 sigma^2) - exp(-8))`` in
+    each of x and y, r from the pixel's centre; without, all of the pixel's own count alike. Beyond
+    the film's border there are no samples: the others count more.
+    """
+
     width: int = Field(ge=1, le=16384)
     height: int = Field(ge=1, le=16384)
+    samples: int = Field(ge=1, le=16, default=1)
+    sigma: float | None = None
 
 
 class Transport(Frozen):

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 import tracer.camera
+import tracer.film
 import tracer.mesh
 import tracer.patterns
 import tracer.scene
@@ -46,6 +47,13 @@ def translate(scene: resolved.ResolvedScene) -> tracer.scene.Scene:
             transmission=transport.transmission,
         ),
     )
+
+
+def sampling(film: resolved.Film) -> tracer.film.Sampling:
+    """How the film's pixels are sampled."""
+    if film.sigma is None:
+        return tracer.film.Sampling(film.samples)
+    return tracer.film.Sampling(film.samples, tracer.film.Gaussian(film.sigma))
 
 
 def _background(
