@@ -153,6 +153,8 @@ def cases(loaded: Sequence[LoadedCase]) -> None:
 def case(prepared: PreparedCase) -> None:
     """The resolved scene, the checks and the truth of one case."""
     from harness.archive import scene_text
+    from harness.measure.observables import Observable
+    from harness.measure.truths import TRUTHS
 
     loaded, console = prepared.loaded, Console()
     console.print(f"[bold]{escape(loaded.id)}[/]  {escape(loaded.model.title)}")
@@ -167,6 +169,11 @@ def case(prepared: PreparedCase) -> None:
     for spec in loaded.model.checks:
         probe = f" by probe '{spec.probe}'" if spec.probe else ""
         console.print(f"check: {escape(spec.observable)}{escape(probe)} against {spec.against}")
+        truth = TRUTHS.get(Observable(spec.observable))
+        if truth is not None:
+            console.print(
+                f"  {escape(truth.form)} ({escape(truth.derived)}); for {escape(truth.domain)}"
+            )
         for known in spec.known:
             console.print(
                 f"  known of {escape(known.renderer)}: {known.at_least:g} to {known.at_most:g}, "

@@ -27,5 +27,9 @@ class Comparison:
     curve: Curve | None = None
 
 
+# Detail of what no index of refraction changes: its condition number.
+FREE_OF_INDEX: dict[str, float | int | str] = {"condition_level": 0.0}
+
+
 class Unmeasurable(Exception):
     """Nothing could be measured; the message says why. The check becomes an ERROR."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.measure.comparison import Comparison, Unmeasurable
+from harness.measure.comparison import FREE_OF_INDEX, Comparison, Unmeasurable
 from harness.measure.images import Pixels
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS
@@ -51,7 +51,9 @@ def energy(
     if noise is not None:
         # A path that is cut brings nothing, so only pixels in which hardly any is count.
         rows = np.flatnonzero(keep & (light.cut < 1e-4))
-        return binned(measured, np.broadcast_to(true, measured.shape), rows, noise)
+        comparison = binned(measured, np.broadcast_to(true, measured.shape), rows, noise)
+        comparison.detail.update(FREE_OF_INDEX)
+        return comparison
     # Paths of the least weight that is followed are followed by one and not by another.
     rounding = ROUNDINGS * depth * precision.arithmetic / 2
     tolerance = (quantum + np.maximum(light.cut, 0) + 2 * least * depth + rounding) * true.max()
@@ -66,5 +68,5 @@ def energy(
         "to be followed + 8 eps per segment",
         detail={"max": float(error[keep].max()), "rms": float(np.sqrt((error[keep] ** 2).mean())),
                 "excluded_close": int((~keep).sum()), "largest_cut": float(light.cut[keep].max()),
-                "worst_pixel_x": k % width, "worst_pixel_y": k // width},
+                "worst_pixel_x": k % width, "worst_pixel_y": k // width, **FREE_OF_INDEX},
     )  # fmt: skip

@@ -14,7 +14,7 @@ from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import nature, worst_level
 from harness.measure.precision import Precision
-from harness.measure.probe_truth import ProbeTruth
+from harness.measure.probe_truth import STEP, ProbeTruth
 from harness.measure.statistics import Noise, binned
 from harness.probe.decode import lit_threshold
 from harness.renderers.base import Status
@@ -45,7 +45,7 @@ def sampled_path_weight(
     rows = np.flatnonzero(used)
     order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
     comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true, order, noise)
-    comparison.detail.update(nature(truth, used))
+    comparison.detail.update(nature(truth, used) | truth.conditions(used))
     return comparison
 
 
@@ -55,8 +55,11 @@ def critical_angle(
     """Angle of incidence at which light stops passing, degrees, between lit and dark pixels."""
     ior = [medium.ior for medium in truth.scene.media]
     solid = truth.scene.solids[0]
-    closed = expected.critical_angle(ior[solid.medium], ior[solid.exterior])
-    return _boundary(truth, pixels, quantum, over_area, closed, lit_below=True)
+    inside, outside = ior[solid.medium], ior[solid.exterior]
+    closed = expected.critical_angle(inside, outside)
+    # d asin(1 / n) / d ln n
+    condition = float(np.tan(closed))
+    return _boundary(truth, pixels, quantum, over_area, closed, condition, lit_below=True)
 
 
 def first_transmitting_angle(
@@ -70,10 +73,11 @@ def first_transmitting_angle(
         raise Unmeasurable("no ray of the middle row lies in the prism's principal plane")
     ior = [medium.ior for medium in truth.scene.media]
     solid = truth.scene.solids[0]
-    closed = expected.prism_first_transmitting_angle(
-        apex_angle(truth, used), ior[solid.medium] / ior[solid.exterior]
-    )
-    return _boundary(truth, pixels, quantum, over_area, closed, lit_below=False)
+    apex, n = apex_angle(truth, used), ior[solid.medium] / ior[solid.exterior]
+    closed = expected.prism_first_transmitting_angle(apex, n)
+    denser = expected.prism_first_transmitting_angle(apex, n * (1 + STEP))
+    condition = abs(denser - closed) / STEP
+    return _boundary(truth, pixels, quantum, over_area, closed, condition, lit_below=False)
 
 
 def _boundary(
@@ -82,6 +86,7 @@ def _boundary(
     quantum: float,
     over_area: bool,
     closed: float,
+    condition: float,
     lit_below: bool,
 ) -> Comparison:
     """Where the middle row turns from lit to dark, against the closed form.
@@ -122,7 +127,7 @@ def _boundary(
         "in which the true light is below 4 quanta",
         "" if ordered else "lit and dark rays alternate around the limit",
         {"last_below_deg": float(np.degrees(low)), "first_above_deg": float(np.degrees(high)),
-         "rays": len(rows), "faint": int(faint.sum())},
+         "rays": len(rows), "faint": int(faint.sum()), "condition_angle": condition},
     )  # fmt: skip
 
 

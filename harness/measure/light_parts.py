@@ -33,6 +33,7 @@ def worst_level(
         "max": float(error[used].max()), "rms": float(np.sqrt(np.mean(error[used] ** 2))),
         "p999": float(np.quantile(error[used], 0.999)), "rays": int(used.sum()),
         "excluded_grazing": int(truth.grazing.sum()), "channel": "rgb"[int(channel)],
+        **truth.conditions(used),
         "worst_pixel_x": int(k % width), "worst_pixel_y": int(k // width),
         "worst_theta_i_deg": float(np.degrees(truth.theta_i[k])), **detail,
     }  # fmt: skip

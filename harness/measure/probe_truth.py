@@ -111,6 +111,17 @@ class ProbeTruth:
                     found[branch.rows] |= landing.status == Status.HIT
         return found
 
+    def conditions(self, used: NDArray[np.bool_]) -> dict[str, float | int | str]:
+        """Condition numbers of the rays `used`, at worst: by a relative change of all indices.
+
+        Of the landing point in units, of the direction in radians, of the path's light.
+        """
+        rates = {"point": self.point, "direction": self.direction, "level": self.weight}
+        return {
+            f"condition_{what}": float(np.max(rate.by_index[used], initial=0.0))
+            for what, rate in rates.items()
+        }
+
     @cached_property
     def natural_level(self) -> Float:
         """(m, 3) what the path leaves of radiance 1 in nature, where light is polarised."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from harness.expected import Float
-from harness.measure.comparison import Comparison, Unmeasurable
+from harness.measure.comparison import FREE_OF_INDEX, Comparison, Unmeasurable
 from harness.measure.images import Pixels
 from harness.measure.panorama import panorama_radiance
 from harness.measure.pictures import geometric_error
@@ -177,7 +177,9 @@ def against_truth(
         if isinstance(scene.background, Panorama):
             raise Unmeasurable("the mean of a panorama over a pixel has no closed form")
         rows = np.flatnonzero(edge.ravel() > footprint(scene))
-        return binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise)
+        sampled = binned(picture.reshape(-1, 3).astype(float), true.reshape(-1, 3), rows, noise)
+        sampled.detail.update(FREE_OF_INDEX)
+        return sampled
     keep = edge > stray
     error = np.abs(picture.astype(np.float64) - true).max(axis=-1)
     roundings = ROUNDINGS * (len(scene.surfaces) + 1) * precision.arithmetic / 2
@@ -190,7 +192,7 @@ def against_truth(
         "quantum of the image + 8 eps per surface, and per radian of a panorama",
         detail={"max": float(error[keep].max()), "rms": float(np.sqrt((error[keep] ** 2).mean())),
                 "excluded_grazing": int((~keep).sum()), "worst_pixel_x": int(x),
-                "worst_pixel_y": int(y)},
+                "worst_pixel_y": int(y), **FREE_OF_INDEX},
     )  # fmt: skip
 
 

@@ -184,7 +184,7 @@ def tir(truth: ProbeTruth, rays: RayMeasurement, _precision: Precision) -> Compa
     detail: dict[str, float | int | str] = {
         "rays": int(clear.sum()), "lit_beyond_critical": int(leaked.sum()),
         "dark_below_critical": int(lost.sum()), "excluded_near_critical": int((~clear).sum()),
-        "method": rays.method,
+        "method": rays.method, **truth.conditions(clear),
     }  # fmt: skip
     return Comparison(
         wrong, 0, 0, wrong == 0,

@@ -45,6 +45,7 @@ def usable(
         "excluded_mixed": int((landed & rays.mixed).sum()),
         "excluded_faint": int((landed & rays.faint & ~rays.seen).sum()),
         "method": rays.method,
+        **truth.conditions(used),
     }
     return used, "; ".join(faults), counts
 

@@ -53,7 +53,7 @@ def all_light(
         rows = np.flatnonzero(used)
         order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
         comparison = binned(measured, true, order, noise)
-        comparison.detail.update(detail)
+        comparison.detail.update(detail | truth.conditions(used))
         return comparison
     # Paths whose weight is the least to be followed may be followed by one and not by the other.
     cut = 2 * transport.min_weight * transport.max_depth
@@ -99,5 +99,5 @@ def brewster_reflectance(
     return Comparison(
         value, closed, tolerance, bool(abs(value - closed) <= tolerance), said,
         detail={"brewster_angle_deg": float(np.degrees(angle)), "rays": int(near.sum()),
-                "bend": bend},
+                "bend": bend, **truth.conditions(near)},
     )  # fmt: skip

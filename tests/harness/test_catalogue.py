@@ -14,10 +14,12 @@ import pytest
 from harness.data import scenes_root
 from harness.judging.judge import CaseJudge
 from harness.judging.results import Contender, Result, Results
-from harness.measure.observables import IMAGE_OBSERVABLES, Observable
+from harness.measure.observables import IMAGE_OBSERVABLES, TRUTH_OBSERVABLES, Observable
+from harness.measure.truths import TRUTHS, page
 from harness.plan import Form, PreparedCase, light_role, prepare, trace_role
 from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Verdict
+from harness.renderers import registry
 from harness.renderers.base import Capability, Image, RayPaths, Status
 from harness.scene import model
 from harness.scene.load import LoadedCase, load_cases, scene_files
@@ -115,11 +117,45 @@ def test_the_truth_passes_and_a_wrong_index_does_not(name: str) -> None:
     assert {c.status for c in right} <= {Verdict.PASS}, [
         (c.id, c.reason) for c in right if c.status is not Verdict.PASS
     ]
+    # Each says how sensitive it is to the indices.
+    assert all(_conditions(c) for c in right), [c.id for c in right if not _conditions(c)]
     for check in verdicts(case, 1e-3):
         blind = Observable(check.observable) in BLIND or check.against == "variant"
         plate = name.startswith(PLATES) and check.observable == Observable.EXIT_DIRECTION
         if not blind and not plate:
             assert check.status in (Verdict.FAIL, Verdict.ERROR), (check.id, check.value)
+
+
+def _conditions(check: Check) -> list[float]:
+    """Those that the check tells, all of which must be numbers."""
+    told = [v for k, v in check.detail.items() if k.startswith("condition_")]
+    return [v for v in told if isinstance(v, float) and np.isfinite(v) and v >= 0]
+
+
+@pytest.mark.parametrize("name", list(first_cases()))
+def test_every_case_names_its_truth_and_its_sources(name: str) -> None:
+    """A closed form with derivation and domain, or an oracle: another renderer by its name.
+
+    The record tells that renderer's version. A picture of colours has no other truth.
+    """
+    case = first_cases()[name].model
+    assert case.formula
+    assert all(source.strip() for source in case.sources)
+    assert case.checks
+    for check in case.checks:
+        if check.against == "truth":
+            truth = TRUTHS[Observable(check.observable)]
+            assert all((truth.form, truth.derived, truth.domain, truth.condition))
+        else:
+            assert Observable(check.observable) not in TRUTHS
+            assert check.against == "renderers" or check.against in registry.available()
+
+
+def test_the_page_of_truths_is_made_of_them() -> None:
+    """Of every observable that has a truth. Write it with `print(truths.page(), end="")`."""
+    assert set(TRUTHS) == TRUTH_OBSERVABLES
+    document = scenes_root().parent / "docs" / "truths.md"
+    assert document.read_text(encoding="utf-8") == page()
 
 
 def test_the_catalogue_is_as_large_as_it_says() -> None:
