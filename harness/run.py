@@ -79,7 +79,7 @@ def run(
         session = Session(
             cases, renderers, helper, storage, settings, quality, report, stand_ins, make_executor
         )
-        interrupted = False
+        interrupted, spent = False, _processor_time()
         (out / "summary.json").unlink(missing_ok=True)  # an old one would belie what is there now
         try:
             session.work()
@@ -88,6 +88,10 @@ def run(
             session.give_up("the run was interrupted before this was judged")
         finally:
             session.close()
+        own, theirs = (b - a for a, b in zip(spent, _processor_time(), strict=True))
+        session.effort = session.effort.model_copy(
+            update={"own_cpu_s": own, "renderers_cpu_s": theirs}
+        )
         summary = _summary(session, command, must_run, interrupted)
         write_times(out, session.records)
         record.write(summary, out / "summary.json")
@@ -112,6 +116,15 @@ def _alone(out: Path) -> Iterator[None]:
                 "another run is writing into this folder", key="--out", value=str(out)
             ) from None
         yield
+
+
+def _processor_time() -> tuple[float, float]:
+    """Seconds, user and system, of this process, and of those that it started and that ended."""
+    import resource
+
+    usages = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    own, theirs = (usage.ru_utime + usage.ru_stime for usage in usages)
+    return own, theirs
 
 
 def _summary(

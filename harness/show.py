@@ -103,6 +103,10 @@ def _effort(summary: Summary, console: Console) -> None:
         parts.append(f"{effort.retried} tried again")
     if effort.damaged:
         parts.append(f"{effort.damaged} damaged entries of the cache made again")
+    cpu = effort.own_cpu_s + effort.renderers_cpu_s
+    if effort.renderers_cpu_s:
+        share = effort.renderers_cpu_s / cpu
+        parts.append(f"{cpu:.0f} s of processor time, {share:.0%} of it in renderers")
     console.print(", ".join(parts))
     if summary.interrupted:
         console.print("[bold]Interrupted:[/] the same command goes on where this run stood.")

@@ -6,6 +6,8 @@ The tree of closed forms says what a recursion of limited depth may leave out, p
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from harness.measure.comparison import FREE_OF_INDEX, Comparison, Unmeasurable
@@ -16,7 +18,7 @@ from harness.measure.statistics import Noise, binned
 from harness.scene.resolved import Panorama, ResolvedScene
 from harness.truth.camera import primary_rays
 from harness.truth.paths import ClosedForm
-from harness.truth.tree import light_around
+from harness.truth.tree import AllLight, light_around
 
 # Renderers in float32 start a ray as far from the surface that it leaves; shorter ways they lose.
 STEP_OFF = 2e-4
@@ -27,6 +29,12 @@ def is_furnace(scene: ResolvedScene) -> bool:
     """Whether the scene is nothing but solids before a background."""
     alike = not isinstance(scene.background, Panorama)
     return alike and bool(scene.solids) and not scene.surfaces and not scene.lights
+
+
+@lru_cache(maxsize=1)  # all renderers of a case are held against it, one after the other
+def _furnace(scene: ResolvedScene) -> AllLight:
+    limits = scene.transport
+    return light_around(ClosedForm(scene), primary_rays(scene), limits.max_depth, limits.min_weight)
 
 
 def energy(
@@ -43,7 +51,7 @@ def energy(
         raise Unmeasurable("the picture holds values that are not finite")
     true = np.array(scene.background)  # no panorama: see is_furnace
     depth, least = scene.transport.max_depth, scene.transport.min_weight
-    light = light_around(ClosedForm(scene), primary_rays(scene), depth, least)
+    light = _furnace(scene)
     measured = picture.reshape(-1, 3).astype(np.float64)
     keep = np.ones(len(measured), bool)
     if precision.arithmetic >= FLOAT32:

@@ -22,7 +22,7 @@ from harness.scene.resolved import Rectangle, ResolvedScene
 from harness.truth.camera import primary_rays
 from harness.truth.law import Interface, Law, fresnel, snell
 from harness.truth.paths import ClosedForm, Landing, TruePaths
-from harness.truth.tree import branches, natural_weight
+from harness.truth.tree import AllLight, branches, light_on, natural_weight
 
 # Step of the differences, relative to the scene's extent. Larger than any float32 renderer's own
 # error, so that a ray within that error of an edge is recognised as grazing it.
@@ -127,6 +127,27 @@ class ProbeTruth:
         """(m, 3) what the path leaves of radiance 1 in nature, where light is polarised."""
         weight = natural_weight(ClosedForm(self.scene), self.rays, self.path)
         return np.asarray(weight[:, None] * self.landings[0].transmission)
+
+    @cached_property
+    def all_light(self) -> AllLight:
+        """What all paths together bring of the first plane's light, to the scene's depth."""
+        return self._all_light(n2=False)
+
+    @cached_property
+    def all_light_n2(self) -> AllLight:
+        """The same where radiance scales with the square of the index."""
+        return self._all_light(n2=True)
+
+    def _all_light(self, n2: bool) -> AllLight:
+        limits = self.scene.transport
+        return light_on(
+            ClosedForm(self.scene),
+            self.rays,
+            self.planes[0],
+            limits.max_depth,
+            limits.min_weight,
+            n2,
+        )
 
     @property
     def theta_i(self) -> Float:

@@ -17,8 +17,6 @@ from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.ray_parts import indices
 from harness.measure.statistics import Noise, binned
 from harness.renderers.base import Status
-from harness.truth.paths import ClosedForm
-from harness.truth.tree import light_on
 
 # Half the width of the window of angles around Brewster's, rad.
 WINDOW = np.radians(1.0)
@@ -37,10 +35,8 @@ def all_light(
     For a slab that is (1 - R)^2 a / (1 - R^2 a^2), cut where the scene's depth cuts it. With
     `noise` a renderer samples, and means are judged; `n2`: its radiance scales with n^2.
     """
-    scene = truth.scene
-    transport = scene.transport
-    form, plane = ClosedForm(scene), truth.planes[0]
-    light = light_on(form, truth.rays, plane, transport.max_depth, transport.min_weight, n2)
+    transport = truth.scene.transport
+    light = truth.all_light_n2 if n2 else truth.all_light
     used = ~truth.grazing & (truth.paths.status != Status.MISS) & (light.level.max(axis=1) > 0)
     if not used.any():
         raise Unmeasurable("no light takes any path to the plane")

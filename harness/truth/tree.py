@@ -32,8 +32,8 @@ class Branch:
     """Those k of the m rays that took `path`, after its last interface.
 
     `rows` (k,) says which. `weight` (k,) is the product of unpolarised Fresnel factors, `natural`
-    (k,) that of polarised light, `absorbed` (k, 3) the optical depth so far. The next interface is
-    `ahead` (k,) away, infinite where there is none.
+    (k,) that of polarised light, NaN where nobody asked for it, `absorbed` (k, 3) the optical depth
+    so far. The next interface is `ahead` (k,) away, infinite where there is none.
     """
 
     path: str
@@ -52,7 +52,7 @@ class _Front:
     """The state of the rays of one branch between two interfaces.
 
     `field` (k, 2, 3) holds the electric fields of two waves of unit power, polarised across each
-    other, in amplitudes whose square is power per beam.
+    other, in amplitudes whose square is power per beam; it is empty where nobody asked for them.
     """
 
     path: str
@@ -69,8 +69,16 @@ class _Front:
         """Only the rays `keep` (k,)."""
         return _Front(
             self.path, self.rows[keep], self.o[keep], self.d[keep], self.inside[:, keep],
-            self.medium[keep], self.weight[keep], self.absorbed[keep], self.field[keep],
+            self.medium[keep], self.weight[keep], self.absorbed[keep],
+            self.field[keep] if len(self.field) else self.field,
         )  # fmt: skip
+
+    def natural(self) -> Float:
+        """(k,) the power of both waves, NaN where there are none."""
+        if not len(self.field):
+            return np.full(len(self.rows), np.nan)
+        power = np.einsum("kij,kij->k", self.field, self.field.conj()).real / 2
+        return np.asarray(power)
 
 
 def branches(
@@ -80,27 +88,27 @@ def branches(
     min_weight: float = 0.0,
     along: str | None = None,
     partial: bool = True,
+    natural: bool = False,
 ) -> Iterator[Branch]:
     """All branches of at most `depth` segments and at least `min_weight`, depth first.
 
     With `along`, only those that start as it does; without `partial`, only those that are reflected
-    where all light is.
+    where all light is. `natural` asks for the weight of polarised light, which is half the work.
     """
     inside = form.enclosed(rays)
     m = len(rays.origins)
     start = _Front(
         "", np.arange(m), rays.origins, rays.directions, inside,
         np.full(m, form.scene.camera.medium, np.intp), np.ones(m), np.zeros((m, 3)),
-        _two_waves(rays.directions),
+        _two_waves(rays.directions if natural else rays.directions[:0]),
     )  # fmt: skip
     waiting = [start]
     while waiting:
         front = waiting.pop()
         met = form.next_interface(front.o, front.d, front.inside)
         yield Branch(
-            front.path, front.rows, front.o, front.d, front.medium, front.weight,
-            np.einsum("kij,kij->k", front.field, front.field.conj()).real / 2, front.absorbed,
-            met.t,
+            front.path, front.rows, front.o, front.d, front.medium, front.weight, front.natural(),
+            front.absorbed, met.t,
         )  # fmt: skip
         goes_on = np.isfinite(met.t)
         if len(front.path) + 1 >= depth or not goes_on.any():
@@ -126,12 +134,13 @@ def _split(form: ClosedForm, front: _Front, met: Boundary, partial: bool) -> tup
     reflectance = fresnel(cos_i, ior_i, ior_t)
     bent, total = refract(front.d, met.n, ior_i, ior_t)
     back = reflect(front.d, met.n)
-    r, t = _amplitudes(cos_i, ior_i, ior_t)
+    waves = len(front.field) > 0
+    r, t = _amplitudes(cos_i, ior_i, ior_t) if waves else (front.field, front.field)
     everyone = np.full(len(o), partial)
 
     def child(letter: str, d: Float, weight: Float, amplitude: Complex, crosses: bool) -> _Front:
         inside = met.behind if crosses else met.before
-        field = _turned(front.field, front.d, d, met.n, amplitude)
+        field = _turned(front.field, front.d, d, met.n, amplitude) if waves else front.field
         medium = met.beyond if crosses else front.medium
         return _Front(
             front.path + letter, front.rows, o, d, inside, medium, front.weight * weight, absorbed,
@@ -191,7 +200,7 @@ def _two_waves(d: Float) -> Complex:
 def natural_weight(form: ClosedForm, rays: Rays, path: str) -> Float:
     """(m,) the weight of `path` for natural, hence polarised, light; NaN where nothing takes it."""
     weight = np.full(len(rays.origins), np.nan)
-    for branch in branches(form, rays, len(path) + 1, along=path):
+    for branch in branches(form, rays, len(path) + 1, along=path, natural=True):
         if branch.path == path:
             weight[branch.rows] = branch.natural
     return weight
@@ -227,7 +236,7 @@ def light_on(
     m = len(rays.origins)
     level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     closest = np.full(m, np.inf)
-    for branch in branches(form, rays, depth, min_weight):
+    for branch in branches(form, rays, depth, min_weight, natural=True):
         if branch.path:
             closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         landing = form.meet(
@@ -248,7 +257,7 @@ def light_around(form: ClosedForm, rays: Rays, depth: int, min_weight: float) ->
     m = len(rays.origins)
     level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     closest = np.full(m, np.inf)
-    for branch in branches(form, rays, depth, min_weight):
+    for branch in branches(form, rays, depth, min_weight, natural=True):
         if branch.path:
             closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         leaves = ~np.isfinite(branch.ahead)

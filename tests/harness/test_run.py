@@ -105,6 +105,10 @@ def test_the_summary_holds_what_scripts_rely_on(tmp_path: Path) -> None:
     renderer = data["renderers"]["student"]
     assert (renderer["version"], renderer["status"], renderer["cases"]) == ("1.0", "ok", 2)
     assert renderer["render_s"] > 0
+    # The student works in this process, so all of the processor time is ours.
+    effort = data["effort"]
+    assert effort["own_cpu_s"] > 0
+    assert effort["own_cpu_s"] > effort["renderers_cpu_s"] >= 0
     assert data["counts"] == {"pass": 6, "fail": 0, "skip": 0, "error": 0, "known": 0}
     assert [case["id"] for case in data["cases"]] == SLABS
     case = data["cases"][0]
