@@ -1,7 +1,7 @@
 # Everything runs from .venv, which `make setup` makes and keeps up to date.
 BIN := .venv/bin
 
-.PHONY: help setup suite catalogue references findings test fuzz guided lint stress format audit lock ui bench scale clean
+.PHONY: help setup suite catalogue references findings detection rivals rates test fuzz guided lint stress format audit lock ui bench scale clean
 .DEFAULT_GOAL := help
 
 help: ## Say what can be made
@@ -27,6 +27,12 @@ findings: setup ## Run the catalogue and write docs/findings.md from its records
 
 detection: setup ## Measure what is seen of wrong renderers, and write docs/detection.md (an hour)
 	@$(BIN)/python -m tests.mutants.detection
+
+rivals: setup ## Install what `make detection` compares with besides its own rules: FLIP
+	@$(BIN)/python -m pip install --quiet --require-hashes -r requirements/rivals.txt
+
+rates: setup ## Judge a right Mitsuba 200 times with fresh seeds, and write docs/rates.md
+	@$(BIN)/python -m tests.bench.rates
 
 test: lint ## Run all tests
 	@$(BIN)/python -m pytest -n 2

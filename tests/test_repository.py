@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.version import Version
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCKS = ("bootstrap", "runtime", "mitsuba", "dev", "audit")
+LOCKS = ("bootstrap", "runtime", "mitsuba", "dev", "audit", "rivals")
 TEXT = {
     *("", ".cfg", ".css", ".html", ".in", ".ini", ".ipynb", ".j2", ".js", ".json", ".md", ".pov"),
     *(".py", ".sh", ".svg", ".toml", ".ts", ".txt", ".yaml", ".yml"),
@@ -91,7 +91,8 @@ def test_locks_hold_what_the_project_asks_for() -> None:
     asked = {
         "runtime": data["project"]["dependencies"],
         "mitsuba": data["project"]["optional-dependencies"]["mitsuba"],
-        "dev": [r for group in data["dependency-groups"].values() for r in group],
+        "dev": [r for name in ("dev", "oracles") for r in data["dependency-groups"][name]],
+        "rivals": data["dependency-groups"]["rivals"],
     }
     for name, wanted in asked.items():
         versions: dict[str, list[Version]] = {}

@@ -13,11 +13,14 @@ from harness import expected
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import nature, worst_level
+from harness.measure.pixel_areas import pixel_areas
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import STEP, ProbeTruth
 from harness.measure.statistics import Noise, binned
 from harness.probe.decode import lit_threshold
 from harness.renderers.base import Status
+from harness.scene.resolved import ResolvedScene
+from harness.truth.paths import TruePaths
 
 
 def path_weight(
@@ -40,8 +43,15 @@ def path_weight(
 def sampled_path_weight(
     truth: ProbeTruth, pixels: NDArray[np.float32], noise: Noise, n2: bool
 ) -> Comparison:
-    """The same for a renderer that samples its lobes: means over bins of like angle."""
-    true, used = _expected_level(truth, n2)
+    """The same for a renderer that samples lobes and pixels: means over bins of like angle."""
+    _, used = _expected_level(truth, n2)
+    areas = pixel_areas(truth)
+    level = areas.paths.weight[:, None] * areas.landing.transmission
+    level = np.nan_to_num(level) * _brightening(truth.scene, areas.paths, n2)[:, None]
+    true = areas.mean(np.where((areas.landing.status == Status.HIT)[:, None], level, 0.0))
+    used = used & areas.whole
+    if not used.any():
+        raise Unmeasurable("every pixel of this path holds an edge")
     rows = np.flatnonzero(used)
     order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
     comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true, order, noise)
@@ -140,9 +150,13 @@ def _expected_level(truth: ProbeTruth, n2: bool) -> tuple[Float, NDArray[np.bool
     used = used & ~truth.ambiguous
     if not (used & landed).any():
         raise Unmeasurable("no ray takes this path alone to the plane")
-    scale = np.ones(len(landed))
-    if n2:
-        ior = np.array([medium.ior for medium in truth.scene.media])
-        scale = (ior[truth.scene.camera.medium] / ior[truth.paths.medium]) ** 2
-    level = np.nan_to_num(truth.level) * scale[:, None]
+    level = np.nan_to_num(truth.level) * _brightening(truth.scene, truth.paths, n2)[:, None]
     return np.where(landed[:, None], level, 0.0), used
+
+
+def _brightening(scene: ResolvedScene, paths: TruePaths, n2: bool) -> Float:
+    """(m,) what radiance is multiplied by from where the path ends to the camera."""
+    if not n2:
+        return np.ones(len(paths.medium))
+    ior = np.array([medium.ior for medium in scene.media])
+    return np.asarray((ior[scene.camera.medium] / ior[paths.medium]) ** 2)

@@ -131,18 +131,19 @@ class ProbeTruth:
     @cached_property
     def all_light(self) -> AllLight:
         """What all paths together bring of the first plane's light, to the scene's depth."""
-        return self._all_light(n2=False)
+        return self.all_light_of(self.rays, n2=False)
 
     @cached_property
     def all_light_n2(self) -> AllLight:
         """The same where radiance scales with the square of the index."""
-        return self._all_light(n2=True)
+        return self.all_light_of(self.rays, n2=True)
 
-    def _all_light(self, n2: bool) -> AllLight:
+    def all_light_of(self, rays: Rays, n2: bool) -> AllLight:
+        """The same of other rays of the camera."""
         limits = self.scene.transport
         return light_on(
             ClosedForm(self.scene),
-            self.rays,
+            rays,
             self.planes[0],
             limits.max_depth,
             limits.min_weight,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from harness import expected
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import distance_to_nature, worst_level
+from harness.measure.pixel_areas import pixel_areas
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.ray_parts import indices
@@ -46,7 +47,9 @@ def all_light(
         "cut": float(light.cut[used].max()),
     }
     if noise is not None:
-        rows = np.flatnonzero(used)
+        areas = pixel_areas(truth)
+        true = areas.mean(truth.all_light_of(areas.rays, n2).level)
+        rows = np.flatnonzero(used & areas.whole)
         order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
         comparison = binned(measured, true, order, noise)
         comparison.detail.update(detail | truth.conditions(used))

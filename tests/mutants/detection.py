@@ -1,7 +1,9 @@
 """Figures about detection: `make detection` writes docs/detection.md and the data that reports
 show, harness/report/detection.json.
 
-    python -m tests.mutants.detection [PROCESSES]
+    python -m tests.mutants.detection [PROCESSES] [--new]
+
+With --new, only wrong renderers that the data do not have yet are measured, and join them.
 
 Every wrong renderer through the whole of snellcheck, right ones of all classes and the reference
 renderers beside them, the smallest faults that are seen, and what rules of other projects see.
@@ -141,6 +143,28 @@ def measure(workers: int) -> dict[str, Any]:
         }
 
 
+def join(known: dict[str, Any], workers: int) -> dict[str, Any]:
+    """The data with what is new, without what is gone. Raises ValueError where scenes differ."""
+    if known["checks"] != (now := sum(len(case.loaded.model.checks) for case in cases())):
+        raise ValueError(
+            f"the scenes have {now} checks and had {known['checks']}: measure all anew"
+        )
+    have = {m["name"]: m for m in known["mutants"]}
+    wrong = (*MUTANTS, *UNLISTED)
+    new = [m for m in wrong if m.name not in have]
+    right = picture(CLEAN)
+    assert right is not None
+    with ProcessPoolExecutor(workers) as pool:
+        have |= {t.mutant.name: _trial_data(t) for t in pool.map(try_one, new)}
+        rivals = known["rivals"] | dict(
+            zip([m.name for m in new], pool.map(partial(seen_by_rivals, right), new), strict=True)
+        )
+    return known | {
+        "mutants": [have[m.name] for m in wrong],
+        "rivals": {m.name: rivals[m.name] for m in wrong},
+    }
+
+
 def _trial_data(t: Trial) -> dict[str, Any]:
     return {
         "name": t.mutant.name, "fault": t.mutant.fault, "amount": t.mutant.amount,
@@ -250,7 +274,12 @@ def _alarm_lines(data: dict[str, Any]) -> list[str]:
 
 
 def main() -> None:
-    data = measure(int(sys.argv[1]) if len(sys.argv) > 1 else os.cpu_count() or 1)
+    counts = [int(a) for a in sys.argv[1:] if a.isdigit()]
+    workers = counts[0] if counts else os.cpu_count() or 1
+    if "--new" in sys.argv:
+        data = join(json.loads(DATA.read_text(encoding="utf-8")), workers)
+    else:
+        data = measure(workers)
     DATA.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     DOCUMENT.write_text(document(data), encoding="utf-8")
     _said(f"wrote {DOCUMENT.relative_to(ROOT)} and {DATA.relative_to(ROOT)}")

@@ -503,6 +503,68 @@ class AbsorptionSaturates(Rules):  # 1 / (1 + depth) for exp(-depth)
         return np.log1p(sigma * length[:, None])
 
 
+@fault
+class StaleNormal(Rules):  # refracts with the normal of the surface before: it was not updated
+    def recalled(self, n, d, before):
+        known = np.isfinite(before[:, 0])
+        before = np.where(known[:, None], before, n)
+        return np.where((dot(d, before) > 0)[:, None], -before, before)
+
+
+@fault
+class FresnelSwappedOut(Rules):  # the two indices swapped on the way out alone
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        right = super().reflectance(cos_i, ior_i, ior_t, entering)
+        swapped = super().reflectance(cos_i, ior_t, ior_i, entering)
+        return np.where(entering | (right >= 1), right, swapped)
+
+
+@fault
+class PoppedTwice(Rules):  # leaving an inner solid, the stack of media forgets the outer one, too
+    def indices(self, inner, outer, entering, shape):
+        here, beyond = super().indices(inner, outer, entering, shape)
+        return here, np.where(entering, beyond, 1.0)
+
+
+@fault
+class PoleNormals(Rules):  # a sphere's normals within a of a pole are those of the pole
+    def shape_normal(self, outward, shape):
+        if shape["type"] != "sphere":
+            return outward
+        polar = np.abs(outward[:, 2]) > 1 - self.a
+        pole = np.stack([0 * outward[:, 2], 0 * outward[:, 2], np.sign(outward[:, 2])], axis=1)
+        return np.where(polar[:, None], pole, outward)
+
+
+@fault
+class GridPositions(Rules):  # places on surfaces are kept on a grid
+    too_near = 1e-6
+
+    def start(self, p, d, n):
+        moved = np.rint(p / self.a) * self.a - p
+        return p + moved - dot(moved, n)[:, None] * n
+
+
+@fault
+class ChannelsSwapped(Rules):  # red is absorbed as blue, and blue as red
+    def absorbed(self, sigma, length, d, n, forward, ends_in_reflection):
+        return sigma[:, ::-1] * length[:, None]
+
+
+@fault
+class TirEarly(Rules):  # reflects all light where a little would still pass
+    def bend(self, d, n, ior_i, ior_t, entering, leg):
+        bent, total = by_ratio(d, n, ior_i / ior_t)
+        return bent, total | (np.abs(dot(bent, n)) < self.a)
+
+
+@fault
+class RowsFlicker(Rules):  # one random number for all pixels of a row
+    def shown(self, image):
+        rows = np.random.default_rng(7).uniform(-1, 1, len(image))
+        return image * (1 + self.a * rows)[:, None, None]
+
+
 # --- controls: right, though they look wrong ------------------------------------------------------
 
 

@@ -139,13 +139,21 @@ MUTANTS = (
     Mutant("brighter", 1.1, ("gain",)),
 )  # fmt: skip
 
-# Wrong in ways that no hypothesis knows.
+# Wrong in ways that no hypothesis knows: found, and said to be none of them.
 UNLISTED = (
     Mutant("twisted", 0.05, (None,)),
     Mutant("coarse-normals", 0.01, (None,)),
     Mutant("index-by-angle", 0.1, (None,)),
     Mutant("fresnel-squared", 1.0, (None,)),
     Mutant("absorption-saturates", 1.0, (None,)),
+    Mutant("stale-normal", 1.0, (None,)),
+    Mutant("fresnel-swapped-out", 1.0, (None,)),
+    Mutant("popped-twice", 1.0, (None,)),
+    Mutant("pole-normals", 1e-3, (None,)),
+    Mutant("grid-positions", 1e-3, (None,)),
+    Mutant("channels-swapped", 1.0, (None,)),
+    Mutant("tir-early", 0.1, (None,)),
+    Mutant("rows-flicker", 0.01, ("preflight",)),
 )
 
 # Right, though they look wrong: nobody may accuse them.

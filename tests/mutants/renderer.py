@@ -56,6 +56,10 @@ class Rules:
         """The normal that refraction and reflection are computed with."""
         return np.where(entering[:, None], outward, -outward)
 
+    def recalled(self, n, d, before):
+        """The normal after all; `before` is that of the surface where the ray started, or NaN."""
+        return n
+
     def indices(self, inner, outer, entering, shape):
         """Indices here and beyond."""
         return np.where(entering, outer, inner), np.where(entering, inner, outer)
@@ -202,7 +206,8 @@ def _split(scene, rules, solid, rays, outward):
     entering = dot(rays["direction"], outward) < 0
     inner = np.full(len(entering), iors[solid["medium"]])
     outer = np.full(len(entering), iors[solid["exterior"]])
-    n, d = rules.faces(outward, entering), rays["direction"]
+    d = rays["direction"]
+    n = rules.recalled(rules.faces(outward, entering), d, rays["n"])
     ior_i, ior_t = rules.indices(inner, outer, entering, solid["shape"])
     bent, total = rules.bend(d, n, ior_i, ior_t, entering, rays["length"])
     facing = np.where((dot(d, n) > 0)[:, None], -n, n)

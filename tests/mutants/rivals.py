@@ -76,7 +76,7 @@ print(float(flip_evaluator.evaluate(b, a, "LDR", inputsRGB=True)[1]))
 
 
 def flip(a: Float, b: Float) -> bool | None:
-    """NVIDIA FLIP (flip-evaluator): a mean above 0.05. None where it is not installed.
+    """NVIDIA FLIP (flip-evaluator, `make rivals`): a mean above 0.05. None where it is not there.
 
     In a process of its own, which it can end.
     """
