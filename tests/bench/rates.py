@@ -38,10 +38,11 @@ can be counted: at the level of real suites, {suite:.0%} for {most:,} checks or 
 |--|--|--|--|--|--|
 {rows}
 
-The level allows for {means} means that are independent: {checks} checks of three channels. Here two are:
-glass without colour shows all channels alike, and what a face transmits it does not reflect. So
-fewer alarms are expected than allowed, by Šidák's formula for two. The interval is Clopper and
-Pearson's; the last column is the chance of as many alarms or more where as many are expected.
+The level allows for {means} means that are independent: {checks} checks of three channels.
+Here two are: glass without colour shows all channels alike, and what a face transmits it does not
+reflect. So fewer alarms are expected than allowed, by Šidák's formula for two. The interval is
+Clopper and Pearson's; the last column is the chance of as many alarms or more where as many are
+expected.
 """
 
 
@@ -69,8 +70,8 @@ def main() -> None:
     text = TEXT.format(
         version=version, system=f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         means=MEANS, checks=len(short_suite()), cases=", ".join(f"`{case}`" for case in CASES),
-        runs=RUNS, samples=samples_needed(), suite=SUITE_LEVEL, most=SUITE_CHECKS, check=FALSE_ALARM,
-        rows="\n".join(rows),
+        runs=RUNS, samples=samples_needed(), suite=SUITE_LEVEL, most=SUITE_CHECKS,
+        check=FALSE_ALARM, rows="\n".join(rows),
     )  # fmt: skip
     write_text(PAGE, text)
     sys.stderr.write(f"wrote {PAGE.relative_to(ROOT)}\n")
