@@ -6,7 +6,6 @@ import json
 import os
 import random
 import re
-import shlex
 import signal
 import subprocess
 import sys
@@ -82,12 +81,17 @@ class Run:
         self.out, self.log = folder / name, folder / f"{name}.log"
         script = folder / f"student-{name}.py"
         script.write_text(LOGGING.format(student=str(STUDENT), log=str(self.log)))
-        self.command = f"{{python}} {shlex.quote(str(script))} {{scene}} {{output.npy}}"
+        self.log.touch()  # confined, it may write to this and its image
+        self.config = folder / f"student-{name}.toml"
+        self.config.write_text(
+            f'[renderer]\nname = "student-{name}"\nformat = "npy"\nwritable = ["{self.log.name}"]\n'
+            f'command = "{{python}} {script.name} {{scene}} {{output}}"\n'
+        )
 
     def start(self, *more: str) -> subprocess.Popen[str]:
         code = "from harness.cli import main; main()"
         arguments = [
-            "run", *CASES, "-r", "tracer", "--renderer-command", self.command, "--scenes",
+            "run", *CASES, "-r", "tracer", "--renderer-config", str(self.config), "--scenes",
             str(SCENES), "--out", str(self.out), "--no-cache", "--no-stored", *more,
         ]  # fmt: skip
         return subprocess.Popen(
@@ -96,7 +100,7 @@ class Run:
         )  # fmt: skip
 
     def images(self) -> int:
-        return len(self.log.read_text().splitlines()) if self.log.exists() else 0
+        return len(self.log.read_text().splitlines())
 
     def wait_for(self, images: int, process: subprocess.Popen[str]) -> None:
         while self.images() < images and process.poll() is None:
