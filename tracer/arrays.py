@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections import Counter
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +13,7 @@ from numpy.typing import NDArray
 
 from tracer.boxes import LINK, NODE
 from tracer.errors import SceneError
+from tracer.faces import face_row
 from tracer.mesh import Mesh, require_closed
 from tracer.patterns import Constant, Pattern, Picture, pattern_row
 from tracer.scene import (
@@ -29,7 +33,7 @@ from tracer.scene import (
     ThinSlab,
     Translucent,
 )
-from tracer.shapes import COLUMNS, HOLLOW, Disk, Quadric, Rectangle, Sphere, bound_row, face_row
+from tracer.shapes import COLUMNS, HOLLOW, Disk, Quadric, Rectangle, Sphere, bound_row
 from tracer.shared import Bound, Surfaces
 from tracer.solids import Cell, Compound, compound_rows
 from tracer.tree import Tree, grow_tree, lined_up
@@ -60,6 +64,7 @@ class Arrays(NamedTuple):
     rows: Floats  # shapes
     media: Floats  # (m, 5): ior, absorption, 1 where it disperses
     solids: int
+    apart: bool  # no two solids overlap or touch
     patterns: Floats
     texels: Floats
     lights: Floats  # (l, 7): position, intensity, POINT; or where from, irradiance, DIRECTIONAL
@@ -163,11 +168,11 @@ class _Flattener:
         rows = [bound_row(bound, number) for bound, number in found]
         match shape:
             case Sphere(center, radius):
-                kind, rows, ball = SPHERE, [[*center, radius]], [*center, radius * radius]
+                kind, rows, ball = SPHERE, [[*center, radius]], _ball(center, radius * radius)
             case Cell(_, center, radius):
-                kind, ball = CELL, [*center, radius * radius * (1.0 + 1e-9)]
+                kind, ball = CELL, _ball(center, radius * radius)
             case Compound(where, center, radius):
-                kind, ball = COMPOUND, [*center, radius * radius * (1.0 + 1e-9)]
+                kind, ball = COMPOUND, _ball(center, radius * radius)
                 for row, decisions in zip(rows, compound_rows(where)[1], strict=True):
                     row += [0.0] * (HOLLOW - len(row)) + decisions
             case Rectangle() | Disk():
@@ -248,10 +253,23 @@ def _light(light: PointLight | DirectionalLight) -> list[float]:
     return [*(-x for x in light.direction), *light.irradiance, DIRECTIONAL]
 
 
+def _ball(center: Iterable[float], radius_squared: float) -> list[float]:
+    """Centre and squared radius, with room for rounding."""
+    return [*center, radius_squared * (1.0 + 1e-9)]
+
+
 def _ball_around(points: Floats) -> list[float]:
     """Centre and squared radius of a ball that holds the points; not the smallest one."""
     center = (points.min(axis=0) + points.max(axis=0)) / 2
-    return [*center.tolist(), float(((points - center) ** 2).sum(axis=1).max())]
+    return _ball(center.tolist(), float(((points - center) ** 2).sum(axis=1).max()))
+
+
+def _apart(balls: list[list[float]]) -> bool:
+    """Whether the spheres around solids are well apart from each other."""
+    return all(
+        math.dist(a[:3], b[:3]) > (math.sqrt(a[3]) + math.sqrt(b[3])) * (1.0 + 1e-6)
+        for a, b in itertools.combinations(balls, 2)
+    )
 
 
 def _table(rows: list[list[float]], columns: int) -> Floats:
@@ -297,6 +315,7 @@ def _flatten(scene: Scene) -> Arrays:
         rows=_table(into.rows, COLUMNS),
         media=media_table(media, scene.wavelength),
         solids=len(scene.solids),
+        apart=_apart(into.balls[: len(scene.solids)]),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([_light(light) for light in scene.lights], 7),

@@ -51,7 +51,7 @@ def inlined(function: Function) -> Function:
 
 
 def called(function: Function) -> Function:
-    """As `inlined`, for what is too large or too rare to be merged into its callers."""
+    """As `inlined`, for what is too large, or called too rarely, to be merged by force."""
     return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 

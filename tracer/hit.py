@@ -21,6 +21,7 @@ from tracer.arrays import (
     Floats,
 )
 from tracer.compiled import inlined
+from tracer.faces import face_distance, open_face
 from tracer.mesh import smooth_normal, triangle_normal
 from tracer.shapes import (
     HOLLOW,
@@ -29,7 +30,6 @@ from tracer.shapes import (
     bound_normal,
     cell_stretch,
     compound_hit,
-    face_distance,
     sphere_normal,
     sphere_stretch,
     vec_at,
@@ -142,7 +142,7 @@ def _next_hit(
     """
     best, hit, face, entering = INF, NOTHING, -1, False
     before, beyond, mesh = AMBIENT, AMBIENT, 0
-    leaving = _surface_left(scene, left, left_face, inward)
+    leaving = surface_left(scene, left, left_face, inward)
     for i in range(len(scene.objects)):
         on_face = left_face if i == left else -1
         t_max = INF if i < scene.solids else best
@@ -150,16 +150,9 @@ def _next_hit(
             t, i_face, enters = known[mesh, 0], int(known[mesh, 1]), known[mesh, 2] > 0.0
             mesh += 1
         else:
-            t, i_face, enters = _object_hit(scene, i, o, d, on_face, inward, leaving, t_max, stack)
-        if t == INF:
-            continue
+            t, i_face, enters = object_hit(scene, i, o, d, on_face, inward, leaving, t_max, stack)
         if i < scene.solids:
-            if t < best:
-                beyond = 1 + i if before == AMBIENT and enters else before
-            elif beyond == AMBIENT and enters == (t == best):
-                beyond = 1 + i
-            if before == AMBIENT and not enters:
-                before = 1 + i
+            before, beyond = ranked(before, beyond, best, i, t, enters)
         if t < best:
             best, hit, face, entering = t, i, i_face, enters
     if medium == UNKNOWN:
@@ -170,7 +163,21 @@ def _next_hit(
 
 
 @inlined
-def _surface_left(scene: Arrays, left: int, left_face: int, inward: bool) -> float:
+def ranked(
+    before: int, beyond: int, best: float, i: int, t: float, enters: bool
+) -> tuple[int, int]:
+    """(before, beyond) the nearest hit so far, at `best`, once solid `i` is met at `t`."""
+    if t == INF:
+        return before, beyond
+    if t < best:
+        beyond = 1 + i if before == AMBIENT and enters else before
+    elif beyond == AMBIENT and enters == (t == best):
+        beyond = 1 + i
+    return 1 + i if before == AMBIENT and not enters else before, beyond
+
+
+@inlined
+def surface_left(scene: Arrays, left: int, left_face: int, inward: bool) -> float:
     """The number of the surface that a ray has left, which solids may share.
 
     Positive if it points to the inside of that surface; 0 where no other solid has it.
@@ -185,7 +192,7 @@ def _surface_left(scene: Arrays, left: int, left_face: int, inward: bool) -> flo
 
 
 @inlined
-def _object_hit(
+def object_hit(
     scene: Arrays,
     i: int,
     o: Vec,
@@ -208,10 +215,14 @@ def _object_hit(
     if on_face >= 0 and not (inward and kind <= CELL):
         return INF, -1, False  # nothing of a convex solid lies outwards; a face is not met twice
     if kind == SPHERE:
-        return _sphere_hit(scene, i, o, d, on_face >= 0)
+        row = scene.objects[i, FIRST]
+        t, entering = sphere_hit(o, d, vec_at(scene.rows, row, 0), scene.rows[row, 3], on_face >= 0)
+        return t, row, entering
     if kind == CELL:
         return _cell_hit(scene, i, o, d, leaving, on_face >= 0)
-    return _face_hit(scene, i, o, d, kind == DISK, t_max)
+    face = open_face(scene.rows, scene.objects[i, FIRST])
+    t = face_distance(o, d, face, kind == DISK, t_max)
+    return t, 0, dot(d, face.z) < 0.0
 
 
 # What a ray meets of one object: (distance, face, entering), infinite distance if it misses.
@@ -242,24 +253,27 @@ def mesh_hits_ahead(
 
 
 @inlined
-def _sphere_hit(scene: Arrays, i: int, o: Vec, d: Vec, inwards: bool) -> tuple[float, int, bool]:
-    """`inwards`: the ray has just left the sphere's surface, heading into it."""
-    row = scene.objects[i, FIRST]
-    center, radius = vec_at(scene.rows, row, 0), scene.rows[row, 3]
+def sphere_hit(o: Vec, d: Vec, center: Vec, radius: float, inwards: bool) -> tuple[float, bool]:
+    """(distance, entering). `inwards`: the ray has just left the surface, heading into the ball."""
     if inwards:
-        return max(0.0, -2.0 * dot(sub(o, center), d)), row, False
+        return max(0.0, -2.0 * dot(sub(o, center), d)), False
     enter, leave = sphere_stretch(o, d, center, radius)
     if enter > 0.0:
-        return enter, row, True
-    return (leave if leave > 0.0 else INF), row, False
+        return enter, True
+    return (leave if leave > 0.0 else INF), False
 
 
 @inlined
-def _far_from_ball(scene: Arrays, i: int, o: Vec, d: Vec) -> bool:
-    """Whether the ray's line misses the sphere around object `i`."""
-    to_center = sub(vec_at(scene.balls, i, 0), o)
-    ahead = dot(to_center, d)
-    return bool(dot(to_center, to_center) - ahead * ahead > scene.balls[i, 3])
+def far_from_ball(o: Vec, d: Vec, center: Vec, radius_squared: float) -> bool:
+    """Whether the ray's line misses a sphere."""
+    from_center = sub(o, center)
+    h = along(from_center, -dot(from_center, d), d)
+    return bool(dot(h, h) > radius_squared)
+
+
+@inlined
+def _misses_ball(scene: Arrays, i: int, o: Vec, d: Vec) -> bool:
+    return far_from_ball(o, d, vec_at(scene.balls, i, 0), scene.balls[i, 3])
 
 
 @inlined
@@ -267,7 +281,7 @@ def _cell_hit(
     scene: Arrays, i: int, o: Vec, d: Vec, leaving: float, inwards: bool
 ) -> tuple[float, int, bool]:
     """`inwards`: the ray has just left one of the cell's faces, heading into it."""
-    if not inwards and _far_from_ball(scene, i, o, d):
+    if not inwards and _misses_ball(scene, i, o, d):
         return INF, -1, False
     first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
     enter, face_in, leave, face_out = cell_stretch(o, d, scene.rows, first, count, leaving)
@@ -284,19 +298,10 @@ def _cell_hit(
 def _compound_hit(
     scene: Arrays, i: int, o: Vec, d: Vec, leaving: float, known_inside: bool, stack: Floats
 ) -> tuple[float, int, bool]:
-    if _far_from_ball(scene, i, o, d):
+    if _misses_ball(scene, i, o, d):
         return INF, -1, False
     first, count = scene.objects[i, FIRST], scene.objects[i, COUNT]
     return compound_hit(o, d, scene.rows, first, count, leaving, known_inside, stack)
-
-
-@inlined
-def _face_hit(
-    scene: Arrays, i: int, o: Vec, d: Vec, is_disk: bool, best: float
-) -> tuple[float, int, bool]:
-    row = scene.objects[i, FIRST]
-    entering = dot(d, vec_at(scene.rows, row, 9)) < 0.0
-    return face_distance(o, d, scene.rows, row, is_disk, best), 0, entering
 
 
 @inlined

@@ -7,18 +7,17 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tracer.arrays import Arrays, Floats, flatten, media_of, media_table
 from tracer.camera import SIDE, camera_row, lens_point, pixel_centre, primary_ray
-from tracer.compiled import compiled
+from tracer.compiled import called, compiled
 from tracer.film import Sampling, developed, reach
-from tracer.hit import new_stack
-from tracer.recursion import Limits, Waiting, radiance
+from tracer.hit import NOTHING, UNKNOWN
+from tracer.recursion import Exposure, Limits, Samples, exposure, go_on
 from tracer.scene import Scene
-from tracer.surface import BLACK, Lobes
-from tracer.threads import for_bands
-from tracer.vector import add, scale
+from tracer.surface import Lobes
+from tracer.threads import Work, for_bands
+from tracer.wave import SIZE, Ray, Wave, nearest_hits, put_ray
 
 BAND = 4  # rows of samples that a thread takes at a time
 CENTRES = Sampling()
@@ -41,56 +40,69 @@ class Render:
     rays: int
 
 
-class Samples(NamedTuple):
-    """Samples of some rows of the film."""
+class Film(NamedTuple):
+    """Of `width` x `height` samples; those that are taken begin with row `first`."""
 
-    radiance: Floats  # (h, w, 3)
-    cut: Floats  # (h, w)
-    closest: Floats
-    rays: NDArray[np.int64]  # (h,)
-    disperses: NDArray[np.uint8]  # (h, w), 1 where the wavelength matters
+    width: int
+    height: int
+    first: int
+
+
+@called
+def _primary_rays(
+    camera: Floats, film: Film, at: int, end: int, samples: Samples, wave: Wave
+) -> tuple[int, int]:
+    """A wave of rays from the camera; (how many, the sample and point of the lens to go on with).
+
+    Both are counted in one, `at` and up to `end`. Samples of which is known that the wavelength
+    does not matter are left as they are.
+    """
+    side, n = int(camera[SIDE]), 0
+    points = side * side
+    while n < SIZE and at < end:
+        pixel, k = at // points, at % points
+        if k == 0:
+            if samples.disperses[pixel] == 0:
+                at += points
+                continue
+            samples.disperses[pixel], samples.cut[pixel], samples.closest[pixel] = 0, 0.0, np.inf
+            for c in range(3):
+                samples.radiance[pixel, c] = 0.0
+        x, y = pixel_centre(
+            pixel % film.width, film.first + pixel // film.width, film.width, film.height
+        )
+        u, v = lens_point(k, side)
+        o, d = primary_ray(camera, x, y, u, v)
+        ray = Ray(o, d, (1.0, 1.0, 1.0), pixel, 1, UNKNOWN, NOTHING, -1, False)
+        put_ray(wave, n, ray)
+        n += 1
+        at += 1
+    return n, at
 
 
 @compiled
 def _expose(
-    scene: Arrays,
-    limits: Limits,
-    lobes: Lobes,
-    camera: Floats,
-    first: int,
-    height: int,
-    begin: int,
-    end: int,
-    waiting: Waiting,
-    stack: Floats,
-    samples: Samples,
-) -> None:
-    """Takes rows [begin, end) of `samples`, whose row 0 is row `first` of a film of `height`.
-
-    Where they say that the wavelength does not matter, they are left as they are.
-    """
-    width, side = samples.cut.shape[1], int(camera[SIDE])
-    share = 1.0 / (side * side)
-    for j in range(begin, end):
-        samples.rays[j] = 0
-        for i in range(width):
-            if samples.disperses[j, i] == 0:
-                continue
-            x, y = pixel_centre(i, first + j, width, height)
-            seen, cut, closest, disperses = BLACK, 0.0, np.inf, False
-            for k in range(side * side):
-                u, v = lens_point(k, side)
-                o, d = primary_ray(camera, x, y, u, v)
-                one = radiance(scene, limits, lobes, o, d, waiting, stack)
-                seen = add(seen, scale(share, one.radiance))
-                cut += share * one.cut
-                closest = min(closest, one.closest)
-                samples.rays[j] += one.rays
-                disperses |= one.disperses
-            for c in range(3):
-                samples.radiance[j, i, c] = seen[c]
-            samples.cut[j, i], samples.closest[j, i] = cut, closest
-            samples.disperses[j, i] = disperses
+    scene: Arrays, exposure: Exposure, camera: Floats, film: Film, begin: int, end: int
+) -> int:
+    """Takes samples [begin, end), and tells how many rays that took."""
+    waiting = exposure.waiting
+    points = int(camera[SIDE]) * int(camera[SIDE])
+    at, rays, height = begin * points, 0, 0
+    while True:
+        fresh = height == 0
+        row = waiting.order[0 if fresh else height - 1]
+        wave = Wave(waiting.floats[row], waiting.ints[row])
+        if fresh:
+            height = 1
+            waiting.filled[row], at = _primary_rays(
+                camera, film, at, end * points, exposure.samples, wave
+            )
+        n = waiting.filled[row]
+        if n == 0:
+            return rays
+        rays += n
+        nearest_hits(scene, wave, n, fresh, exposure.scratch)
+        height = go_on(scene, exposure, height - 1)
 
 
 def render(
@@ -168,7 +180,6 @@ def _unexposed(height: int, width: int) -> Samples:
         np.empty((*film, 3)),
         np.empty(film),
         np.empty(film),
-        np.empty(height, np.int64),
         np.ones(film, np.uint8),
     )
 
@@ -181,13 +192,23 @@ def _take(
     limits = Limits(transport.max_depth, transport.min_weight)
     lobes = Lobes(transport.reflection, transport.transmission, transport.radiance_n2)
     rows, width = samples.cut.shape
-    camera = camera_row(scene.camera, width, height)
+    camera, film = camera_row(scene.camera, width, height), Film(width, height, first)
+    share = 1.0 / camera[SIDE] ** 2
+    flat = Samples(
+        samples.radiance.reshape(-1, 3),
+        samples.cut.reshape(-1),
+        samples.closest.reshape(-1),
+        samples.disperses.reshape(-1),
+    )
+    rays: list[int] = []
 
-    def some(begin: int, end: int) -> None:
-        depth = transport.max_depth + 1
-        waiting = Waiting(np.empty((depth, 9)), np.empty((depth, 5), np.int64))
-        stack = new_stack(arrays)
-        _expose(arrays, limits, lobes, camera, first, height, begin, end, waiting, stack, samples)
+    def worker() -> Work:
+        own = exposure(arrays, limits, lobes, share, flat)
 
-    for_bands(some, rows, BAND, threads)
-    return int(samples.rays.sum())
+        def some(begin: int, end: int) -> None:
+            rays.append(_expose(arrays, own, camera, film, begin * width, end * width))
+
+        return some
+
+    for_bands(worker, rows, BAND, threads)
+    return sum(rays)

@@ -31,7 +31,7 @@ from tracer.optics import reflect
 from tracer.scene import Scene
 from tracer.shapes import vec_at
 from tracer.surface import interface, thin_slab, upright
-from tracer.threads import for_bands
+from tracer.threads import Work, for_bands
 from tracer.vector import Vec, dot, scale
 from tracer.walk import Lanes, new_lanes
 
@@ -300,12 +300,16 @@ def follow(
     main = path is None
     meshes = int((arrays.objects[:, SHAPE] == MESH).sum())
 
-    def some(begin: int, end: int) -> None:
-        ahead = np.empty((end - begin, meshes, 3))
-        scratch = ahead, new_lanes(), new_stack(arrays)
-        _follow(arrays, solids, o, d, letters, main, max_depth, begin, end, found, *scratch)
+    def worker() -> Work:
+        ahead, lanes, stack = np.empty((BAND, meshes, 3)), new_lanes(), new_stack(arrays)
 
-    for_bands(some, n, BAND, threads)
+        def some(begin: int, end: int) -> None:
+            scratch = ahead[: end - begin], lanes, stack
+            _follow(arrays, solids, o, d, letters, main, max_depth, begin, end, found, *scratch)
+
+        return some
+
+    for_bands(worker, n, BAND, threads)
     if not vertices:
         return found._replace(**{name: getattr(found, name)[:0] for name in Log._fields})
     places = {id(solid): k for k, solid in enumerate(scene.solids)}

@@ -106,7 +106,7 @@ def pattern_radiance(
         columns, lines = rows[row, 7], rows[row, 8]
         i = int(min(math.floor(u * columns), columns - 1.0))
         j = int(min(math.floor(v * lines), lines - 1.0))
-        return vec_at(rows, row, 1 if (i + j) % 2 == 0 else 4)
+        return vec_at(rows, row, 1 if (i + j) & 1 == 0 else 4)
     if kind == RAMP:
         c = u if rows[row, 7] == 0.0 else v
         a, b = vec_at(rows, row, 1), vec_at(rows, row, 4)

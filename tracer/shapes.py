@@ -1,4 +1,4 @@
-"""What solids are bounded by, and open faces; intersected in closed form.
+"""What solids are bounded by, intersected in closed form; and the shapes of open faces.
 
 A bound is convex: a half-space (`Plane`) or a body of revolution of second degree (`Quadric`). A
 ray meets it in one stretch from `enter` to `leave`. What is inside all of some bounds (a `Cell` of
@@ -113,11 +113,6 @@ def bound_row(bound: Plane | Quadric, number: int) -> list[float]:
     return [QUADRIC, number, *bound.origin, *bound.axis, bound.a, bound.b, bound.c]
 
 
-def face_row(face: Rectangle | Disk) -> list[float]:
-    half = (face.radius,) * 2 if isinstance(face, Disk) else (face.size[0] / 2, face.size[1] / 2)
-    return [*face.origin, *face.x, *face.y, *face.z, *half]
-
-
 @inlined
 def vec_at(rows: Rows, row: int, column: int) -> Vec:
     return rows[row, column], rows[row, column + 1], rows[row, column + 2]
@@ -150,13 +145,10 @@ def sphere_stretch(o: Vec, d: Vec, center: Vec, radius: float) -> tuple[float, f
 def plane_stretch(o: Vec, d: Vec, normal: Vec, offset: float) -> tuple[float, float]:
     approach = dot(normal, d)
     height = offset - dot(normal, o)
-    if approach < 0.0:
-        return height / approach, INF
-    if approach > 0.0:
-        return -INF, height / approach
-    if height >= 0.0:
-        return -INF, INF
-    return INF, -INF
+    if approach == 0.0:
+        return (-INF, INF) if height >= 0.0 else (INF, -INF)
+    t = height / approach
+    return t if approach < 0.0 else -INF, t if approach > 0.0 else INF
 
 
 @called
@@ -332,29 +324,6 @@ def _left_behind(
         if best < t <= 0.0:
             best, row = t, at
     return -best, row
-
-
-@inlined
-def face_distance(o: Vec, d: Vec, rows: Rows, row: int, is_disk: bool, best: float) -> float:
-    """Distance to a rectangle or disk, from either side; infinite if missed or not before `best`.
-
-    Whatever lies behind the ray or beyond `best` is sorted out before anything is divided.
-    """
-    z = vec_at(rows, row, 9)
-    center = vec_at(rows, row, 0)
-    height, approach = dot(z, sub(center, o)), dot(z, d)
-    if approach < 0.0:
-        height, approach = -height, -approach
-    if not 0.0 < height < best * approach:
-        return INF
-    t = height / approach
-    p = sub(along(o, t, d), center)
-    x, y = dot(p, vec_at(rows, row, 3)), dot(p, vec_at(rows, row, 6))
-    if is_disk:
-        inside = x * x + y * y <= rows[row, 12] * rows[row, 12]
-    else:
-        inside = abs(x) <= rows[row, 12] and abs(y) <= rows[row, 13]
-    return t if inside else INF
 
 
 # --- their outward normals ------------------------------------------------------------------------

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from tracer.arrays import (
-    DIELECTRIC,
     DIFFUSE,
     EXTERIOR,
     FIRST,
     MATERIAL,
     MEDIUM,
     MIRROR,
-    NORMALS,
     PATTERN,
     RECTANGLE,
     SHAPE,
@@ -50,8 +48,8 @@ class Scattered(NamedTuple):
     """What a surface does with a ray.
 
     `sent` is the radiance it sends back along the ray. The ray goes on from `p` along `wr` with
-    its weight times `reflected`, and from `p_t` along `wt`, in the medium `beyond`, with its
-    weight times `transmitted`, having crossed `crossed` interfaces.
+    its weight times `reflected`, and from `p_t` along `wt` with its weight times `transmitted`,
+    having crossed `crossed` interfaces.
     """
 
     sent: Vec
@@ -61,8 +59,6 @@ class Scattered(NamedTuple):
     transmitted: Vec
     p_t: Vec
     wt: Vec
-    medium: int
-    beyond: int
     crossed: int
 
 
@@ -141,31 +137,18 @@ def scatter(
     hit: int,
     face: int,
     entering: bool,
-    behind: int,
     stack: Floats,
 ) -> Scattered:
-    """What happens to the ray from `o` along `d` in `medium`, which hits after `t`.
-
-    Behind an interface is the medium `behind`.
+    """What happens to the ray from `o` along `d` in `medium`, which hits after `t` what is no
+    interface of two media.
     """
     objects = scene.objects
     p, n, geometric = hit_point(scene, o, t, d, hit, face, entering)
     wi = scale(-1.0, d)
     sent, reflected, passed = BLACK, BLACK, BLACK
-    wr, wt, p_t, beyond, crossed = wi, d, p, medium, 1
+    wr, wt, p_t, crossed = wi, d, p, 1
     material = objects[hit, MATERIAL]
-    if material == DIELECTRIC:
-        beyond = behind
-        ior_i, ior_t = scene.media[medium, 0], scene.media[beyond, 0]
-        if objects[hit, NORMALS] >= 0:
-            n = upright(wi, n, geometric, ior_i, ior_t)
-        transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
-        if lobes.reflection or not transmits:
-            reflected = (R, R, R)
-        if lobes.transmission and transmits:
-            T = (1.0 - R) * ((ior_i / ior_t) ** 2 if lobes.radiance_n2 else 1.0)
-            passed = (T, T, T)
-    elif material == MIRROR:
+    if material == MIRROR:
         wr, reflected = reflect(wi, n), vec_at(scene.materials, hit, 0)
     elif material == DIFFUSE:
         albedo, glint = vec_at(scene.materials, hit, 0), scene.materials[hit, 7]
@@ -186,4 +169,4 @@ def scatter(
             r1, t1 = _slab_lobes(R, a[1], lobes)
             r2, t2 = _slab_lobes(R, a[2], lobes)
             reflected, passed = (r0, r1, r2), (t0, t1, t2)
-    return Scattered(sent, reflected, p, wr, passed, p_t, wt, medium, beyond, crossed)
+    return Scattered(sent, reflected, p, wr, passed, p_t, wt, crossed)

@@ -9,12 +9,18 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+Work = Callable[[int, int], None]
 
-def for_bands(work: Callable[[int, int], None], total: int, band: int, threads: int | None) -> None:
-    """Calls ``work(begin, end)`` for all bands of [0, total), on all cores by default."""
+
+def for_bands(worker: Callable[[], Work], total: int, band: int, threads: int | None) -> None:
+    """Calls ``work(begin, end)`` for all bands of [0, total), on all cores by default.
+
+    Each thread has a `work` of its own from `worker()`, with tables that it need not share.
+    """
     begins = iter(range(0, total, band))  # shared: each thread takes what is next
 
     def some() -> None:
+        work = worker()
         for begin in begins:
             work(begin, min(begin + band, total))
 
