@@ -131,7 +131,7 @@ def test_what_was_tried_again_is_told_at_the_end_of_a_run(
     assert summary.effort.retried == 2
     console = Console(file=io.StringIO(), width=200)
     show._effort(summary, console)
-    assert ", 2 tried again\n" in console.file.getvalue()  # type: ignore[attr-defined]
+    assert ", 2 tried again, " in console.file.getvalue()  # type: ignore[attr-defined]
 
 
 def test_what_does_not_pass_ends_as_an_error(
