@@ -11,6 +11,8 @@ type Point = readonly [number, number];
 const WIDTH = 640;
 const HEIGHT = 380;
 const MARGIN = 34;
+const LETTER = 6.6; // width of one in a label of an angle
+const LINE = 15;
 
 /** A plane with two axes in it. */
 interface Plane {
@@ -130,7 +132,8 @@ export function sectionOf(rays: Rays, ray: Ray, colours: Readonly<Record<string,
   clip.append(...rays.probe.planes.map((p) => planeLine(p, plane, frame)).filter((e) => e !== null));
   clip.append(...renderedEnds(ray, plane, frame, colours));
   clip.append(svg("path", { class: "true-ray", d: path(way.map(place)) }));
-  for (let k = 0; k < met; k++) clip.append(...interfaceMarks(ray, way, k, frame));
+  const room = freeRoom();
+  for (let k = 0; k < met; k++) clip.append(...interfaceMarks(ray, way, k, frame, room));
   const last = way[way.length - 1];
   if (last && ray.status === 0) {
     const [x, y] = place(last);
@@ -193,7 +196,28 @@ function renderedEnds(
   });
 }
 
-function interfaceMarks(ray: Ray, way: readonly Point[], k: number, frame: Frame): SVGElement[] {
+/** Finds labels a place where no other is, beside the one they would rather have. */
+type Room = (wished: Point, text: string) => Point | null;
+
+function freeRoom(): Room {
+  const taken: (readonly [Point, number])[] = []; // centre and half the width
+  return (wished, text) => {
+    const half = (text.length * LETTER) / 2;
+    for (const step of [0, -1, 1, -2, 2, -3, 3]) {
+      const place: Point = [wished[0], wished[1] + step * LINE];
+      const free = taken.every(([other, wide]) =>
+        Math.abs(other[0] - place[0]) > half + wide || Math.abs(other[1] - place[1]) >= LINE);
+      if (!free) continue;
+      taken.push([place, half]);
+      return place;
+    }
+    return null; // the table beside the diagram has the angle
+  };
+}
+
+function interfaceMarks(
+  ray: Ray, way: readonly Point[], k: number, frame: Frame, room: Room,
+): SVGElement[] {
   const here = way[k + 1] as Point;
   const from = way[k] as Point;
   const next = way[k + 2];
@@ -220,8 +244,8 @@ function interfaceMarks(ray: Ray, way: readonly Point[], k: number, frame: Frame
     arc(centre, back, normal, 26),
   ];
   const label = (angle: number, text: string): void => {
-    const [x, y] = at(angle, 44);
-    parts.push(svg("text", { class: "angle", x, y: y + 4 }, text));
+    const place = room(at(angle, 44), text);
+    if (place) parts.push(svg("text", { class: "angle", x: place[0], y: place[1] + 4 }, text));
   };
   label(middle(back, normal), `θᵢ ${degrees(ray.thetaI[k])}`);
   if (next && ray.letters[k] === "T") {
