@@ -212,3 +212,23 @@ def _beyond(bound: Round, points: Points) -> Values:
     if bound.c > 0:
         away = np.maximum(away, -bound.b / (2 * bound.c) - z)
     return np.asarray(away)
+
+
+def thickness(shape: resolved.SolidShape) -> float:
+    """How thick a solid is where it is thinnest, as far as its bounds tell."""
+    match shape:
+        case resolved.Sphere():
+            return 2 * shape.radius
+        case resolved.Cylinder() | resolved.Cone():
+            return min(2 * shape.radius, shape.height)
+        case resolved.Lens():
+            rims = profile(shape, 1, shape.aperture) - profile(shape, 0, shape.aperture)
+            return min(2 * shape.aperture, max(shape.thickness, rims))
+        case resolved.Convex():
+            planes = np.array(shape.planes)
+            depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
+            return float(depths.min())
+        case resolved.Csg():
+            return min(map(thickness, shape.parts))
+        case resolved.Mesh():
+            return float(np.ptp(np.array(shape.vertices), axis=0).min())

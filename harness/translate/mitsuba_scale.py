@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from harness.scene import resolved as rs
-from harness.scene.regions import profile
+from harness.scene.regions import thickness
 
 # 600 of Mitsuba's offsets (1e-4): thinner solids would be shifted or swallowed.
 THINNEST = 1 / 16
@@ -23,32 +21,12 @@ THICKEST = 8.0
 
 def length_scale(scene: rs.ResolvedScene) -> float:
     """The power of two by which `describe` multiplies lengths; 1 for scenes of ordinary size."""
-    thinnest = min((_thickness(solid.shape) for solid in scene.solids), default=1.0)
+    thinnest = min((thickness(solid.shape) for solid in scene.solids), default=1.0)
     if thinnest < THINNEST:
         return 2.0 ** math.ceil(math.log2(THINNEST / thinnest))
     if thinnest > THICKEST:
         return 2.0 ** -math.ceil(math.log2(thinnest / THICKEST))
     return 1.0
-
-
-def _thickness(shape: rs.SolidShape) -> float:
-    """How thick a solid is where it is thinnest, roughly."""
-    match shape:
-        case rs.Sphere():
-            return 2 * shape.radius
-        case rs.Cylinder() | rs.Cone():
-            return min(2 * shape.radius, shape.height)
-        case rs.Lens():
-            rims = profile(shape, 1, shape.aperture) - profile(shape, 0, shape.aperture)
-            return min(2 * shape.aperture, max(shape.thickness, rims))
-        case rs.Convex():
-            planes = np.array(shape.planes)
-            depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
-            return float(depths.min())
-        case rs.Csg():
-            return min(map(_thickness, shape.parts))
-        case rs.Mesh():
-            return float(np.ptp(np.array(shape.vertices), axis=0).min())
 
 
 def scaled(scene: rs.ResolvedScene, factor: float) -> rs.ResolvedScene:

@@ -15,7 +15,7 @@ import numpy as np
 from harness.errors import RendererUnsupported
 from harness.scene import resolved as rs
 from harness.scene.containment import bounds, signed_distance
-from harness.scene.regions import profile
+from harness.scene.regions import thickness
 
 # configbackend.h of POV-Ray 3.7: MIN_ISECT_DEPTH, SMALL_TOLERANCE, MAX_DISTANCE.
 HIT_FLOOR = 1e-4
@@ -50,26 +50,6 @@ def length_scale(scene: rs.ResolvedScene) -> float:
                 f"ignores hits nearer than {HIT_FLOOR:g} and farther than {FAR:g} units"
             )
     return factor
-
-
-def thickness(shape: rs.SolidShape) -> float:
-    """How thick a solid is where it is thinnest, as far as its bounds tell."""
-    match shape:
-        case rs.Sphere():
-            return 2 * shape.radius
-        case rs.Cylinder() | rs.Cone():
-            return min(2 * shape.radius, shape.height)
-        case rs.Lens():
-            rims = profile(shape, 1, shape.aperture) - profile(shape, 0, shape.aperture)
-            return min(2 * shape.aperture, max(shape.thickness, rims))
-        case rs.Convex():
-            planes = np.array(shape.planes)
-            depths = planes[:, 3] - (np.array(shape.vertices) @ planes[:, :3].T).min(axis=0)
-            return float(depths.min())
-        case rs.Csg():
-            return min(map(thickness, shape.parts))
-        case rs.Mesh():
-            return float(np.ptp(np.array(shape.vertices), axis=0).min())
 
 
 def extent(scene: rs.ResolvedScene) -> float:
