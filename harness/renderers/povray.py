@@ -30,6 +30,7 @@ from harness.renderers.delivery import delivered
 from harness.renderers.developing import developed, of_samples
 from harness.renderers.needs import require
 from harness.renderers.process import Finished, run_limited
+from harness.renderers.process_tree import attempts
 from harness.renderers.proof import proof_scene, prove
 from harness.scene import resolved as rs
 from harness.translate.povray import MAX_TRACE_LEVEL, PovScene, options, translate
@@ -40,6 +41,13 @@ INSTALL = "brew install povray" if MACOS else "sudo apt-get install povray"
 REINSTALL = "brew reinstall povray" if MACOS else "sudo apt-get install --reinstall povray"
 OLDEST = (3, 7)
 GOODBYE = "POV-Ray finished"
+# Its threads get two seconds to start, which a busy machine may not have: no fault of the scene.
+LATE = "Timed out waiting for worker thread startup"
+_BANNER = re.compile(
+    r"Persistence of Vision\(tm\) Ray Tracer Version.*?"
+    r"^Support libraries used by POV-Ray:\n(?:[^\n]+\n)+",
+    re.DOTALL | re.MULTILINE,
+)
 
 # POV-Ray's own confinement. It was seen not to hold, so it is not what safety rests on: that is
 # `translate.povray`, which lets numbers alone into the scene, and the system's confinement below.
@@ -145,7 +153,10 @@ class PovRayRenderer:
             folder = Path(name)
             _write(translated, scene, folder)
             arguments = ["scene.ini", f"+WT{max(1, settings.threads):d}"]
-            done = _run([path, *arguments], folder, settings)
+            for _ in attempts():
+                done = _run([path, *arguments], folder, settings)
+                if LATE not in done.stderr:
+                    break
             log = messages(done.stderr)
             if done.returncode != 0:
                 raise RendererFailed(_reason(log, done.returncode), log=log)
@@ -208,7 +219,7 @@ def _run(argv: list[str], folder: Path, settings: RenderSettings) -> Finished:
     home = folder / "home"
     for series in ("3.7", "3.8"):
         configuration = home / ".povray" / series / "povray.conf"
-        configuration.parent.mkdir(parents=True)
+        configuration.parent.mkdir(parents=True, exist_ok=True)
         configuration.write_text(CONFIGURATION, encoding="ascii")
     ini = home / "povray.ini"
     ini.touch()
@@ -232,12 +243,9 @@ def confinement(executable: str) -> Confinement:
 
 def messages(stderr: str) -> str:
     """What POV-Ray said of the scene, word for word: stderr without banner and progress."""
-    start, banner, rest = stderr.partition("Persistence of Vision(tm) Ray Tracer Version")
-    if banner:
-        # The banner ends where parsing begins, or with the stream, where it never began.
-        _, parsing, after = rest.partition("==== [Parsing...]")
-        rest = parsing + after if parsing else banner + rest
-    lines = (start + rest).splitlines()
+    # A short parse may be over before the front end looks, which then says nothing of it: where the
+    # banner ends must be told by the banner.
+    lines = _BANNER.sub("", stderr, count=1).splitlines()
     said = [s for s in lines if s.strip() and not s.startswith("==== [") and s != GOODBYE]
     return "\n".join(said)
 

@@ -18,7 +18,7 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from pathlib import Path
 from typing import IO
@@ -202,18 +202,29 @@ def spawn(
     return tree
 
 
+def attempts() -> Iterator[None]:
+    """A turn at once and a few more, counted and after pauses, for what only the moment is against.
+
+    Whoever succeeds leaves the loop.
+    """
+    yield
+    for pause_s in PAUSES_S:
+        if (running := _RUNNING.get()) is not None:
+            running.count_retry()
+        time.sleep(pause_s)
+        yield
+
+
 def _patiently(begin: Callable[[], subprocess.Popen[bytes]]) -> subprocess.Popen[bytes]:
     """What `begin` starts, after some more attempts where what is in its way will pass."""
-    for pause_s in PAUSES_S:
+    for _ in attempts():
         try:
             return begin()
         except OSError as error:
             if error.errno not in PASSING:
                 raise
-        if (running := _RUNNING.get()) is not None:
-            running.count_retry()
-        time.sleep(pause_s)
-    return begin()
+            trouble = error
+    raise trouble
 
 
 def _limit(pid: int, output_mb: int, cpu_s: float | None) -> None:
