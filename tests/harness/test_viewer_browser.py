@@ -70,7 +70,10 @@ def colours_of(page: Page, pane: int = 0) -> list[list[int]]:
     """The distinct colours of a pane's canvas."""
     data = page.evaluate(
         """(k) => { const c = document.querySelectorAll('.pane canvas')[k];
-        const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        const copy = new OffscreenCanvas(c.width, c.height)  // the page's own is not for reading
+          .getContext('2d', { willReadFrequently: true });
+        copy.drawImage(c, 0, 0);
+        const d = copy.getImageData(0, 0, c.width, c.height).data;
         const s = new Set(); for (let i = 0; i < d.length; i += 4)
         s.add([d[i], d[i+1], d[i+2]].join()); return [...s]; }""",
         pane,

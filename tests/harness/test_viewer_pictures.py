@@ -56,7 +56,10 @@ def shown_at(page: Page, *steps: int) -> NDArray[np.int64]:
     """The colours of the first pane's canvas so many of its pixels to the right of its middle."""
     found = page.evaluate(
         """steps => { const c = document.querySelector('.pane canvas');
-        const { data } = c.getContext('2d').getImageData(0, c.height / 2, c.width, 1);
+        const copy = new OffscreenCanvas(c.width, 1)  // the page's own is not for reading
+          .getContext('2d', { willReadFrequently: true });
+        copy.drawImage(c, 0, -Math.floor(c.height / 2));
+        const { data } = copy.getImageData(0, 0, c.width, 1);
         return steps.map((x) => [...data.slice(4 * (c.width / 2 + x), 4 * (c.width / 2 + x) + 3)]);
         }""",
         list(steps),
