@@ -130,10 +130,12 @@ class Archive:
 
     def sweep(self) -> None:
         """Removes files that a run was writing when it was killed."""
+        found = [*self.root.glob(".*")]
         for folder in ("assets", "cases", "data", "images", "records", "scenes"):
-            for path in (self.root / folder).rglob(".*"):
-                if PARTIAL.fullmatch(path.name) and path.is_file():
-                    path.unlink(missing_ok=True)
+            found += (self.root / folder).rglob(".*")
+        for path in found:
+            if PARTIAL.fullmatch(path.name) and path.is_file():
+                path.unlink(missing_ok=True)
 
     def files(self, name: str) -> list[str]:
         """The paths of all that belongs to a case, its record last, relative to the folder."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from pathlib import Path
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import settings
 
 # No test depends on how fast the machine is.
 settings.register_profile("snellcheck", deadline=None)
 settings.load_profile("snellcheck")
 
-# What tests run is no part of the user's history.
-_HISTORY = tempfile.TemporaryDirectory(prefix="snellcheck-history-")
-os.environ["SNELLCHECK_HISTORY"] = str(Path(_HISTORY.name) / "history.sqlite")
+
+@pytest.fixture(scope="session", autouse=True)
+def _no_history_of_tests(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What tests run is no part of the user's history."""
+    with pytest.MonkeyPatch.context() as patch:
+        history = tmp_path_factory.mktemp("history") / "history.sqlite"
+        patch.setenv("SNELLCHECK_HISTORY", str(history))
+        yield

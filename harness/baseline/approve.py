@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import subprocess
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -28,6 +27,7 @@ from harness.documents import Model, read, write_bytes
 from harness.errors import InputError, Problem, nearest
 from harness.record import BaselineState, CaseRecord, Check, ImageFile, RendererRun, Verdict
 from harness.scene.load import pattern
+from harness.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from harness.baseline.store import Store
@@ -183,7 +183,7 @@ def approve(
 ) -> list[Path]:
     """Writes the baselines of `plans` below `folder`; returns the files written."""
     needed = [one for one in plans if one.needed]
-    with tempfile.TemporaryDirectory() as staging:
+    with temporary_folder() as staging:
         # All pictures are read and encoded before anything is written: one may be refused.
         pictures = [
             [

@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +21,7 @@ from harness.documents import write_bytes
 from harness.errors import InputError
 from harness.imagefile import Pixels
 from harness.record import ImageFile
+from harness.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from harness.baseline.store import Store
@@ -59,7 +59,7 @@ def restore(image: StoredImage, data: bytes, name: Path) -> Pixels:
     """(H, W, 3) float32 of the PNG `data`. Raises InputError where it is not what was approved."""
     if hashlib.sha256(data).hexdigest() != image.sha256:
         raise InputError.of("not the picture that was approved: its hash differs", file=name)
-    with TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         file = Path(folder) / "picture.png"
         file.write_bytes(data)
         try:
@@ -71,7 +71,7 @@ def restore(image: StoredImage, data: bytes, name: Path) -> Pixels:
 
 def _encoded(shares: NDArray[np.floating]) -> bytes:
     """Shares of the whole range, 0 to 1; as floats they round by 1/256 of a step at most."""
-    with TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         file = Path(folder) / "picture.png"
         imagefile.write_png(file, shares.astype(np.float32), bits=16, encoding="linear")
         return file.read_bytes()

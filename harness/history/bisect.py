@@ -9,7 +9,6 @@ import contextlib
 import os
 import shlex
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from harness.errors import InputError
 from harness.history.revision import git
+from harness.temporary import temporary_folder
 
 
 class Answer(StrEnum):
@@ -125,7 +125,7 @@ def _culprit(tree: Path, said: str) -> Culprit | None:
 
 @contextlib.contextmanager
 def _worktree(root: Path, commit: str) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory(prefix="snellcheck-") as folder:
+    with temporary_folder() as folder:
         tree = Path(folder) / "tree"
         _git(root, "worktree", "add", "--quiet", "--detach", str(tree), commit)
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 from harness.errors import InputError
 from harness.history.bisect import Answer
 from harness.record import Check, Verdict, read_summary
+from harness.temporary import temporary_folder
 
 
 def verdict_of_case(
@@ -24,7 +24,7 @@ def verdict_of_case(
     """
 
     def verdict(tree: Path) -> tuple[Answer, str]:
-        with tempfile.TemporaryDirectory(prefix="snellcheck-") as name:
+        with temporary_folder() as name:
             out = Path(name) / "run"
             # snellcheck itself stays the one that runs now, even where it is what is bisected.
             code = f"import sys; sys.path[:0] = {sys.path!r}; from harness.cli import main; main()"

@@ -8,7 +8,6 @@ import os
 import select
 import shutil
 import subprocess
-import tempfile
 import time
 import weakref
 from collections.abc import Mapping, Sequence
@@ -23,6 +22,7 @@ from harness.renderers.limits import OUTPUT_MB, POLL_S, Watch
 from harness.renderers.process import describe_signal, tail
 from harness.renderers.process_tree import ProcessTree, spawn
 from harness.renderers.wire import Reply
+from harness.temporary import make_folder
 
 LINE_BYTES = 1 << 20  # no reply is longer
 _ERRORS: dict[str, type[RendererError]] = {
@@ -48,7 +48,7 @@ class Child:
         confinement: Confinement,
     ) -> None:
         self._name = name
-        self._private = Path(tempfile.mkdtemp(prefix="snellcheck-"))
+        self._private = make_folder()
         self._log = (self._private / "stderr").open("ab+", buffering=0)
         try:
             self._tree = spawn(

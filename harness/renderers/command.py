@@ -8,7 +8,6 @@ import re
 import shlex
 import shutil
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +24,7 @@ from harness.renderers.needs import require
 from harness.renderers.process import run_limited, tail
 from harness.renderers.proof import proof_scene, prove
 from harness.scene.resolved import ResolvedScene
+from harness.temporary import temporary_folder
 
 ImageFormat = Literal["exr", "pfm", "npy", "png", "ppm"]
 
@@ -161,7 +161,7 @@ class CommandRenderer:
         require(scene, self.name, self.capabilities)
         with (
             self._confinement.explained(),
-            tempfile.TemporaryDirectory(prefix="snellcheck-") as private,
+            temporary_folder() as private,
         ):
             output = Path(private) / f"image.{self._image_format}"
             scene_file = self.emit(scene, Path(private))

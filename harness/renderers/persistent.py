@@ -28,6 +28,7 @@ from harness.renderers.delivery import delivered, described
 from harness.renderers.needs import require
 from harness.renderers.proof import proof_scene, prove
 from harness.scene.resolved import ResolvedScene
+from harness.temporary import make_folder
 
 Environment = Mapping[str, str] | Callable[[], Mapping[str, str]] | None
 
@@ -232,7 +233,7 @@ class WorkerRenderer:
         """The room, which outlives a worker that has to be replaced."""
         with self._lock:
             if self._room is None:
-                self._room = Path(tempfile.mkdtemp(prefix="snellcheck-")).resolve()
+                self._room = make_folder()
                 self._remove_room = weakref.finalize(self, shutil.rmtree, self._room, True)
             return self._room
 

@@ -12,7 +12,6 @@ import re
 import shlex
 import shutil
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +32,7 @@ from harness.renderers.process import Finished, run_limited
 from harness.renderers.process_tree import attempts
 from harness.renderers.proof import proof_scene, prove
 from harness.scene import resolved as rs
+from harness.temporary import temporary_folder
 from harness.translate.povray import MAX_TRACE_LEVEL, PovScene, options, translate
 from harness.translate.povray_stock import translate as translate_stock
 
@@ -125,7 +125,7 @@ class PovRayRenderer:
     def version(self) -> str:
         if self._version is None:
             path = self._path()
-            with tempfile.TemporaryDirectory(prefix="snellcheck-povray-") as folder:
+            with temporary_folder() as folder:
                 done = _run([path, "--version"], Path(folder), RenderSettings(timeout_s=30))
             found = re.search(r"^POV-Ray (\d+)\.(\d+)\S*", done.stdout + done.stderr, re.MULTILINE)
             if found is None:
@@ -149,7 +149,7 @@ class PovRayRenderer:
             return developed(self.render(of_samples(scene), settings), scene.film)
         path = self._path()
         translated = self.translate(scene)
-        with tempfile.TemporaryDirectory(prefix="snellcheck-povray-") as name:
+        with temporary_folder() as name:
             folder = Path(name)
             _write(translated, scene, folder)
             arguments = ["scene.ini", f"+WT{max(1, settings.threads):d}"]

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
-import secrets
 import signal
 import subprocess
 import sys
@@ -27,8 +26,7 @@ import psutil
 
 from harness.errors import RendererFailed, RendererMissing
 from harness.renderers.confinement import Confinement, start
-
-TOKEN = "SNELLCHECK_PROCESS"
+from harness.temporary import TOKEN, new_token
 
 Pipe = int | IO[bytes]
 
@@ -173,8 +171,7 @@ def spawn(
     Where there is no room for a process it is tried again, a few times. Raises RendererMissing
     where `argv[0]` cannot be found or is no program, RendererFailed where it cannot be started.
     """
-    token = secrets.token_hex(8)
-    before = set(psutil.pids())
+    token, before = new_token(), set(psutil.pids())
 
     def begin() -> subprocess.Popen[bytes]:
         return subprocess.Popen(

@@ -312,12 +312,15 @@ def test_a_second_run_is_kept_out_of_the_folder(tmp_path: Path) -> None:
 
 def test_what_a_killed_run_was_writing_is_swept_away(tmp_path: Path) -> None:
     half = tmp_path / "a" / "records" / ".snell.json.abcd1234"
+    whole = tmp_path / "a" / ".summary.json.abcd1234"
     mine = tmp_path / "a" / "records" / ".gitignore"
     half.parent.mkdir(parents=True)
     half.write_text("{")
+    whole.write_text("{}")
     mine.write_text("*")
     go(tmp_path / "a", None, cases=["snell"])
     assert not half.exists()
+    assert not whole.exists()
     assert mine.exists()
 
 

@@ -51,11 +51,10 @@ def command(folder: Path, out: Path | None, scenes: Path | None) -> None:
 
 def _sample(finding: Finding, scenes: Path | None) -> Sample | None:
     """The finding in its smallest scene, no variant, as the renderer is given it."""
-    import tempfile
-
     from harness.plan import shown_to
     from harness.renderers import registry
     from harness.report.findings import Sample
+    from harness.temporary import temporary_folder
 
     language, how = COMMANDS[finding.renderer.partition("-")[0]]
     renderer = registry.create(finding.renderer)
@@ -64,7 +63,7 @@ def _sample(finding: Finding, scenes: Path | None) -> Sample | None:
         if "~" in check.id or check.against != "truth":
             continue
         (case,) = prepared_cases((shown.id,), "normal", scenes)
-        with tempfile.TemporaryDirectory() as name:
+        with temporary_folder() as name:
             probe = check.id.partition("(")[2].partition(")")[0]
             scene = shown_to(case, probe or None, renderer.capabilities)
             text = renderer.emit(scene, Path(name)).read_text(encoding="utf-8")
