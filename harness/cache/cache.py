@@ -6,6 +6,7 @@ what cannot be read is made again, and where nothing can be written, nothing is 
 
 from __future__ import annotations
 
+import errno
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,6 +21,10 @@ from harness.errors import InputError
 LIMIT = 4 * 2**30  # bytes; the suite at normal quality takes about a hundredth of it
 # It is trimmed to this part of the limit, so that not every write has to look at all entries.
 TRIMMED = 0.9
+# A place that is far away fails now and then. After so many failures it is asked no more, or each
+# might cost the time that it takes to notice.
+FORGIVEN = 3
+LASTING = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM})
 
 
 @dataclass(frozen=True)
@@ -33,23 +38,27 @@ class Verified:
 class Cache:
     """Entries in `store`, at most `limit` bytes of them. Threads may share one.
 
-    `trouble` is why nothing is written any more, "" where all is well. `damaged` counts entries
-    that did not pass their checksum; they were removed.
+    `trouble` is why nothing is written any more, "" where all is well: the place is full, may only
+    be read, or has failed too often. `damaged` counts entries that did not pass their checksum;
+    they were removed.
     """
 
     def __init__(self, store: Store, limit: int = LIMIT) -> None:
         self.store, self.limit = store, limit
         self.trouble = ""
         self.damaged = 0
+        self._failures = 0
         self._unweighed = 0  # bytes written since the folder was last weighed
         self._lock = threading.Lock()
 
     def get(self, key: str) -> Entry | None:
         """The entry of `key`, None where there is none that is whole."""
+        if self._failures > FORGIVEN:
+            return None
         try:
             data = self.store.read(key)
         except OSError as error:
-            self._trouble("read", error)
+            self._failed("read", error)
             return None
         if data is None:
             return None
@@ -68,7 +77,7 @@ class Cache:
         try:
             self.store.write(key, data)
         except OSError as error:
-            self._trouble("write", error)
+            self._failed("write", error, lasting=error.errno in LASTING)
             return
         with self._lock:
             self._unweighed += len(data)
@@ -80,8 +89,11 @@ class Cache:
         """Removes what was used longest ago where the limit is passed; returns how many."""
         with self._lock:
             self._unweighed = 0
-        size = sum(entry.size for entry in self.store.entries())
-        return self.store.trim(int(self.limit * TRIMMED)) if size > self.limit else 0
+        try:
+            return self.store.trim(self.limit, int(self.limit * TRIMMED))
+        except OSError as error:
+            self._failed("trim", error)
+            return 0
 
     def verify(self) -> Verified:
         """Reads every entry and removes those that are not whole."""
@@ -109,10 +121,13 @@ class Cache:
         try:
             self.store.remove(key)
         except OSError as error:
-            self._trouble("remove from", error)
+            self._failed("remove from", error)
 
-    def _trouble(self, verb: str, error: OSError) -> None:
-        self.trouble = f"cannot {verb} {self.store.where}: {error.strerror or error}"
+    def _failed(self, verb: str, error: OSError, *, lasting: bool = False) -> None:
+        with self._lock:
+            self._failures += not lasting
+            if lasting or self._failures > FORGIVEN:
+                self.trouble = f"cannot {verb} {self.store.where}: {error.strerror or error}"
 
 
 def open_cache(where: str = "", limit: int = LIMIT) -> Cache:

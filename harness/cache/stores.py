@@ -7,6 +7,7 @@ for each other, and where two write the same entry they write the same bytes.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import time
@@ -50,8 +51,11 @@ class Store(Protocol):
 
     def entries(self) -> Iterator[Stored]: ...
 
-    def trim(self, limit: int) -> int:
-        """Removes what was used longest ago until `limit` bytes hold the rest; returns how many."""
+    def trim(self, limit: int, target: int) -> int:
+        """Once `limit` bytes are passed, leaves `target` of those used last; returns how many went.
+
+        Raises OSError.
+        """
         ...
 
 
@@ -85,12 +89,14 @@ class FolderStore:
                 about = path.stat()
                 yield Stored(path.name.removesuffix(ENDING), about.st_size, about.st_mtime)
 
-    def trim(self, limit: int) -> int:
+    def trim(self, limit: int, target: int) -> int:
         self._sweep()
         known = sorted(self.entries(), key=lambda entry: entry.used)
         total, removed = sum(entry.size for entry in known), 0
+        if total <= limit:
+            return 0
         for entry in known:
-            if total <= limit:
+            if total <= target:
                 break
             self.remove(entry.key)
             total -= entry.size
@@ -129,33 +135,47 @@ class RemoteStore:
         self.where = url
 
     def read(self, key: str) -> bytes | None:
-        try:
+        with _as_os_error(), contextlib.suppress(FileNotFoundError):
             return bytes(self._files.cat_file(self._path(key)))
-        except FileNotFoundError:
-            return None
+        return None
 
     def write(self, key: str, data: bytes) -> None:
         # Some file systems show a file while it is written, so it gets its name at the end.
         path = self._path(key)
         part = f"{path}.{secrets.token_hex(4)}.part"
-        self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
-        self._files.pipe_file(part, data)
-        self._files.mv(part, path)
+        with _as_os_error():
+            self._files.makedirs(path.rpartition("/")[0], exist_ok=True)
+            self._files.pipe_file(part, data)
+            self._files.mv(part, path)
 
     def remove(self, key: str) -> None:
-        with contextlib.suppress(FileNotFoundError):
+        with _as_os_error(), contextlib.suppress(FileNotFoundError):
             self._files.rm_file(self._path(key))
 
     def entries(self) -> Iterator[Stored]:
-        found: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
+        found: dict[str, dict[str, Any]] = {}
+        with _as_os_error(), contextlib.suppress(FileNotFoundError):
+            found = self._files.find(self._root, detail=True)
         for path, about in found.items():
             if path.endswith(ENDING):
                 key = path.rpartition("/")[2].removesuffix(ENDING)
                 yield Stored(key, int(about["size"] or 0), 0.0)
 
-    def trim(self, limit: int) -> int:  # noqa: ARG002
+    def trim(self, limit: int, target: int) -> int:  # noqa: ARG002
         """Nothing: a shared place has its own rules for how long it keeps files."""
         return 0
 
     def _path(self, key: str) -> str:
         return f"{self._root.rstrip('/')}/{key[:2]}/{key}{ENDING}"
+
+
+@contextlib.contextmanager
+def _as_os_error() -> Iterator[None]:
+    """Raises OSError for whatever goes wrong: each file system has errors of its own."""
+    try:
+        yield
+    except OSError:
+        raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise OSError(errno.EIO, " ".join(reason.split())[:200]) from error

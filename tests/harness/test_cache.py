@@ -7,13 +7,13 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from harness.cache import stores
-from harness.cache.cache import Cache, open_cache
+from harness.cache.cache import FORGIVEN, Cache, open_cache
 from harness.cache.entry import Damaged, Entry, decode
 from harness.cache.stores import FolderStore, RemoteStore
 from harness.errors import InputError
@@ -136,7 +136,7 @@ def test_files_of_writers_that_were_killed_are_swept_away(tmp_path: Path) -> Non
         path.write_bytes(b"half")
     past = time.time() - 2 * stores.STALE_S
     os.utime(old, (past, past))
-    store.trim(10**9)
+    store.trim(10**9, 10**9)
     assert not old.exists()
     assert new.exists()  # its writer may be alive
     assert [stored.key for stored in store.entries()] == [KEY]
@@ -207,3 +207,77 @@ def test_a_url_that_nobody_knows_is_bad_input() -> None:
     pytest.importorskip("fsspec")
     with pytest.raises(InputError, match="nonsense"):
         RemoteStore("nonsense://somewhere")
+
+
+# --- places that fail now and then ----------------------------------------------------------------
+
+
+class Refused(Exception):
+    """What a library for some cloud raises: no OSError."""
+
+
+@pytest.fixture
+def flaky() -> list[str]:
+    """`flaky://` is memory that refuses as many operations as are in the list."""
+    memory = pytest.importorskip("fsspec.implementations.memory").MemoryFileSystem
+    fsspec = pytest.importorskip("fsspec")
+    refusals: list[str] = []
+
+    def refusing(name: str) -> Callable[..., object]:
+        method = getattr(memory, name)
+
+        def work(self: object, *args: object, **kwargs: object) -> object:
+            if refusals:
+                raise Refused(refusals.pop())
+            return method(self, *args, **kwargs)
+
+        return work
+
+    names = ("cat_file", "pipe_file", "mv", "rm_file", "find", "makedirs")
+    methods = {name: refusing(name) for name in names}
+    kind = type("Flaky", (memory,), {"protocol": "flaky", "store": {}, **methods})
+    fsspec.register_implementation("flaky", kind, clobber=True)
+    return refusals
+
+
+def test_a_place_that_fails_now_and_then_is_used_all_the_same(flaky: list[str]) -> None:
+    cache = open_cache("flaky://bucket/folder")
+    for _ in range(FORGIVEN):
+        flaky.append("503")
+        assert cache.get(KEY) is None
+    cache.put(KEY, ENTRY.meta, ENTRY.blocks)
+    assert cache.get(KEY) == ENTRY
+    assert cache.trouble == ""
+    assert cache.verify().whole == 1
+
+
+@pytest.mark.parametrize("work", ["get", "put"])
+def test_a_place_that_keeps_failing_is_told_and_asked_no_more(flaky: list[str], work: str) -> None:
+    cache = open_cache("flaky://bucket/folder")
+    cache.put(KEY, ENTRY.meta, ENTRY.blocks)
+    flaky += ["503 Service Unavailable"] * 100
+    for _ in range(20):
+        if work == "get":
+            cache.get(OTHER)
+        else:
+            cache.put(OTHER, {}, {})
+    assert "flaky://bucket/folder: Refused: 503 Service Unavailable" in cache.trouble
+    assert 100 - len(flaky) == FORGIVEN + 1
+    flaky.clear()
+    assert cache.get(KEY) is None  # slow to notice each time, as far as we know
+
+
+def test_a_folder_that_may_only_be_read_still_serves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cache = open_cache(str(tmp_path))
+    cache.put(KEY, ENTRY.meta, ENTRY.blocks)
+
+    def refused(path: Path, data: bytes) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+
+    monkeypatch.setattr(stores, "write_bytes", refused)
+    for _ in range(2 * FORGIVEN):
+        cache.put(OTHER, {}, {})
+    assert "Read-only" in cache.trouble
+    assert cache.get(KEY) == ENTRY
