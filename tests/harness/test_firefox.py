@@ -57,7 +57,7 @@ class Firefox:
 @pytest.fixture(scope="module")
 def firefox(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Firefox]:
     marionette = pytest.importorskip(
-        "marionette_driver.marionette", reason="uv pip install marionette-driver"
+        "marionette_driver.marionette", reason="marionette-driver is for Linux"
     )
     program = next(filter(None, map(shutil.which, ("firefox-esr", "firefox"))), None)
     if program is None:
