@@ -20,7 +20,7 @@ from markupsafe import Markup
 from harness import record as records
 from harness.errors import InputError
 from harness.record import CaseRecord, Summary, SummaryCase, Verdict
-from harness.report import changes, chart, mathml, overview, quantity, view
+from harness.report import changes, chart, checks, mathml, overview, quantity, view
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
 from harness.report.detection import detection
 from harness.report.differences import differences
@@ -172,7 +172,7 @@ class _Report:
         ]
         charts = [chart.draw(curve, self.colours) for curve in record.curves]
         name, parameters = view.split_id(record.id)
-        checks = view.sorted_views(record.checks)
+        views = checks.sorted_views(record.checks)
         return self.environment.get_template("case.html.j2").render(
             stamp=stamp,
             record=record,
@@ -180,10 +180,12 @@ class _Report:
             id_parameters=parameters,
             headings=_parameters(record),
             formula=mathml.typeset(record.formula),
-            checks=checks,
+            checks=checks.grouped(views),
             change_of=changes.change,
-            diagnoses=overview.ranked(record.diagnoses, record.checks),
-            worst_of={v.check.renderer: v for v in reversed(checks)},
+            diagnoses=checks.ranked(record.diagnoses, record.checks),
+            worst_of={v.check.renderer: v for v in reversed(views)},
+            last_words={run.name: view.last_words(run) for run, _, _ in runs},
+            elsewhere={run.name: checks.elsewhere(run.name, record.checks) for run, _, _ in runs},
             runs=runs,
             pictured=any(images for _, _, images in runs),
             coarse=all(i.width < COARSE for run in record.runs for i in run.images),
@@ -223,7 +225,7 @@ class _Report:
             exit_meaning=overview.EXIT_CODES.get(self.summary.exit_code, "unknown"),
             stray=self.stray,
             verdicts=[verdict.value for verdict in Verdict],
-            diagnoses=overview.ranked(
+            diagnoses=checks.ranked(
                 self.summary.diagnoses, (c for case in self.summary.cases for c in case.checks)
             ),
             changed=changes.panel(self.summary.baseline),
@@ -301,6 +303,8 @@ def environment() -> jinja2.Environment:
         seconds=quantity.seconds,
         count=quantity.count,
         size=quantity.size,
-        check=view.check_view,
+        check=checks.check_view,
+        told=checks.told,
+        meaning=checks.meaning,
     )
     return environment

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from harness.record import CaseRecord, Check, DifferenceMap
+from harness.report.checks import CheckView, sorted_views
 from harness.report.links import RunFolder, clean
 from harness.report.quantity import number, with_unit
-from harness.report.view import CheckView, sorted_views
 
 
 @dataclass(frozen=True)

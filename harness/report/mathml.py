@@ -219,9 +219,11 @@ class _Parser:
         while left == "(" and self.take(","):
             inner = _element("mrow", inner, _element("mo", ","), content())
         self.need(right)
-        fence = '<mo fence="true" form="{}">{}</mo>'
-        opening = Markup(fence).format("prefix", left)
-        closing = Markup(fence).format("postfix", right)
+        # Around a fraction or a root they grow; around a letter with an index they would, too.
+        tall = "true" if "<mfrac>" in inner or "<msqrt>" in inner else "false"
+        fence = '<mo fence="true" stretchy="{}" form="{}">{}</mo>'
+        opening = Markup(fence).format(tall, "prefix", left)
+        closing = Markup(fence).format(tall, "postfix", right)
         return Box(_element("mrow", opening, inner, closing), inner)
 
     def function(self, name: str) -> Box:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
 
-from harness.record import Check, Diagnosis, Summary, Verdict
+from harness.record import Check, RendererSummary, Summary, Verdict
+from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view
 from harness.report.links import clean
 from harness.report.quantity import count, number
-from harness.report.view import CheckView, Line, check_view
+from harness.report.view import Line
 
 EXIT_CODES = {
     0: "all passed",
@@ -40,15 +41,14 @@ class Headline:
 
 def headline(summary: Summary) -> Headline:
     counts = dict.fromkeys(Verdict, 0)
-    bad: list[tuple[tuple[bool, float], str, CheckView]] = []
+    bad: list[tuple[tuple[int, float], str, CheckView]] = []
     good: list[tuple[float, str, CheckView]] = []
     for case in summary.cases:
         for check in case.checks:
             counts[check.status] += 1
             view = check_view(check)
-            if check.status in (Verdict.FAIL, Verdict.ERROR):
-                # A wrong number is better news to open with than a missing one.
-                bad.append(((check.status != Verdict.FAIL, view.rank[1]), case.id, view))
+            if check.status in BAD:
+                bad.append((view.rank, case.id, view))
             elif check.status == Verdict.PASS and view.ratio:
                 good.append((-view.ratio, case.id, view))
     state, text = _sentence(summary, counts)
@@ -67,40 +67,46 @@ MOST_FAILURES = 6
 
 @dataclass(frozen=True)
 class Failure:
-    """A check that fails, where it stands and how many more of its renderer and kind there are."""
+    """A check that fails, who is off there, where it stands and how many more like it there are."""
 
     case: str
     view: CheckView
+    off: str
     more: int
 
 
 def failures(summary: Summary) -> tuple[list[Failure], int]:
-    """The worst check of each renderer and observable that fails, and how many kinds are left out.
+    """The worst check of each kind of failure, and how many kinds are left out.
 
-    One fault of a renderer fails many checks; each kind of failure is listed once.
+    One fault of a renderer fails many checks: each of its observables that fail is one kind, and so
+    is each reason for which it has no figures. Every renderer's first kind stands before any
+    renderer's second, lest what fails most hide who fails at all.
     """
     kinds: dict[tuple[str, str], list[tuple[tuple[int, float], str, CheckView]]] = {}
     for case in summary.cases:
         for check in case.checks:
-            if check.status in (Verdict.FAIL, Verdict.ERROR):
+            if check.status in BAD:
                 view = check_view(check)
-                order = (int(check.status != Verdict.FAIL), view.rank[1])
-                kinds.setdefault((check.renderer, check.observable), []).append(
-                    (order, case.id, view)
-                )
-    worst = sorted(
-        ((min(found, key=lambda f: f[0]), len(found) - 1) for found in kinds.values()),
-        key=lambda item: item[0][0],
-    )
-    shown = [Failure(clean(case), view, more) for (_, case, view), more in worst[:MOST_FAILURES]]
+                kind = check.observable if check.status is Verdict.FAIL else check.reason
+                kinds.setdefault((_who(check), kind), []).append((view.rank, case.id, view))
+    worst = [
+        (min(found, key=lambda f: f[0]), who, len(found) - 1) for (who, _), found in kinds.items()
+    ]
+    worst.sort(key=lambda item: item[0][0])
+    turns: Counter[str] = Counter()
+    in_turn: list[tuple[int, Failure]] = []
+    for (_, case_id, view), who, more in worst:
+        in_turn.append((turns[who], Failure(clean(case_id), view, clean(who), more)))
+        turns[who] += 1
+    in_turn.sort(key=lambda item: item[0])
+    shown = [failure for _, failure in in_turn[:MOST_FAILURES]]
     return shown, max(0, len(worst) - MOST_FAILURES)
 
 
-def ranked(diagnoses: Sequence[Diagnosis], checks: Iterable[Check]) -> list[tuple[str, Diagnosis]]:
-    """Diagnoses with the verdict whose colour they bear: of renderers that fail before the rest."""
-    failing = {c.renderer for c in checks if c.status in (Verdict.FAIL, Verdict.ERROR)}
-    toned = [("fail" if d.renderer in failing else "known", d) for d in diagnoses]
-    return sorted(toned, key=lambda item: item[0] != "fail")
+def _who(check: Check) -> str:
+    """Who is off where a check fails: of two that differ perhaps the other one."""
+    off = check.attribution.off if check.attribution else []
+    return check.renderer if check.renderer in off or not off else off[0]
 
 
 def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:
@@ -150,14 +156,11 @@ class Tally:
     shares: list[tuple[str, float, float]]
 
 
-BAR_ORDER = (Verdict.FAIL, Verdict.ERROR, Verdict.SKIP, Verdict.KNOWN, Verdict.PASS)
-
-
 def tally(summary: Summary) -> Tally:
     counts = Counter(check.status for case in summary.cases for check in case.checks)
     everything = sum(counts.values())
     shares, start = [], 0.0
-    for verdict in BAR_ORDER:
+    for verdict in FIRST_TO_LOOK_AT:
         if counts[verdict]:
             width = 1000 * counts[verdict] / everything
             shares.append((verdict.value, round(start, 2), round(width, 2)))
@@ -227,14 +230,15 @@ def renderer_lines(
 
 def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> RendererLine:
     known = summary.renderers.get(name)
+    failed = sum(row.verdicts[column] is Verdict.ERROR for row in rows)
     checks = [c for case in summary.cases for c in case.checks if c.renderer == name]
     verdicts = Counter(check.status for check in checks)
     facts = known.facts if known else {}
     return RendererLine(
         name=name,
         version=clean(known.version) if known else "",
-        ok=known is not None and known.status == "ok",
-        state=clean(known.status) if known else "not in summary",
+        ok=known is not None and known.status == "ok" and not failed,
+        state=_state(known, failed, sum(row.verdicts[column] is not None for row in rows)),
         reason=clean(known.reason) if known else "",
         remedy=clean(known.remedy) if known else "",
         facts=[
@@ -250,6 +254,15 @@ def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> Ren
         passed=verdicts[Verdict.PASS] + verdicts[Verdict.KNOWN],
         render_s=known.render_s if known else 0.0,
     )
+
+
+def _state(known: RendererSummary | None, failed: int, asked: int) -> str:
+    """One word; of a renderer that works by itself also in how many of its cases it did not."""
+    if known is None:
+        return "not in summary"
+    if known.status != "ok" or not failed:
+        return clean(known.status)
+    return f"error in {failed} of {count(asked, 'case')}"
 
 
 MOST_MARKS = 150  # that can still be told apart, and clicked

@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from harness.record import CaseRecord, Curve, RendererRun, Verdict
 from harness.report.chart import LEFT, RIGHT, Chart
+from harness.report.checks import sorted_views
 from harness.report.links import RunFolder, clean
 from harness.report.view import renderer_verdict
 
@@ -36,6 +37,7 @@ def case_data(
             "colours": dict(colours),
             "verdicts": {name: verdict for name, verdict in verdicts.items() if verdict},
             "suspects": _suspects(record),
+            "ray": _ray(record),
             "absent": [_absent(run) for run in record.runs if not run.images],
             "curves": [
                 _curve(curve, chart) for curve, chart in zip(record.curves, charts, strict=True)
@@ -50,6 +52,16 @@ def _suspects(record: CaseRecord) -> list[str]:
     bad = (Verdict.FAIL, Verdict.ERROR)
     named += [c.renderer for c in record.checks if c.against == "truth" and c.status in bad]
     return [clean(name) for name, _ in Counter(named).most_common()]
+
+
+def _ray(record: CaseRecord) -> dict[str, Any] | None:
+    """The ray to look at first: where the worst check that does not pass is furthest off."""
+    for view in sorted_views(record.checks):
+        check = view.check
+        if view.pixel and check.against == "truth" and check.status is not Verdict.PASS:
+            probe = view.label.removeprefix("probe ")
+            return {"renderer": clean(check.renderer), "probe": probe, "pixel": view.pixel}
+    return None
 
 
 def embeddable(data: object) -> Markup:

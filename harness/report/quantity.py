@@ -30,8 +30,9 @@ def number(value: float | None, resolution: float | None = None, digits: int = 4
         text = f"{value:.{max(0, digits - 1 - exponent)}f}"
         return _trim(text).replace("-", MINUS)
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    times = f"{NARROW_SPACE}×{NARROW_SPACE}10{str(int(power)).translate(SUPERSCRIPT)}"
-    return _trim(mantissa).replace("-", MINUS) + times
+    ten = f"10{str(int(power)).translate(SUPERSCRIPT)}"
+    times = f"{NARROW_SPACE}×{NARROW_SPACE}{ten}"
+    return ten if float(mantissa) == 1 else _trim(mantissa).replace("-", MINUS) + times
 
 
 def _trim(text: str) -> str:

@@ -1,19 +1,16 @@
 """What pages show, as plain values: sorted, worded, with links that exist. Templates only place it.
 
-Nothing is judged here. Verdicts come from the records; `share` (error over tolerance) only orders
-failures and draws the bars.
+Nothing is judged here: verdicts come from the records.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from markupsafe import Markup
 
 from harness.record import (
-    SEVERITY,
     CaseRecord,
     Check,
     Curve,
@@ -26,105 +23,19 @@ from harness.record import (
 )
 from harness.report.changes import Change, change
 from harness.report.chart import sparkline
+from harness.report.checks import (
+    BAD,
+    FIRST_TO_LOOK_AT,
+    CheckView,
+    check_view,
+    elsewhere,
+    ranked,
+    sorted_views,
+    told,
+)
 from harness.report.links import RunFolder, clean
-from harness.report.quantity import number, share, with_unit
 
 BROWSER_TYPES = (".png", ".webp", ".jpg", ".jpeg", ".gif", ".avif", ".svg")
-
-
-# --- checks ---------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class CheckView:
-    """A check with its figures as text. `ratio` is the error over the tolerance, None if unknown.
-
-    `main` and `limit` are for places where there is no room for value, expectation and tolerance.
-    """
-
-    check: Check
-    label: str  # the check's id without what stands beside it anyway, or ""
-    ratio: float | None
-    value: str
-    expected: str
-    tolerance: str
-    error: str
-    main: str
-    limit: str
-    used: str
-    bar: float  # 0 … 1, for drawing
-    largest: str  # anywhere, where `value` is of the ray that uses most of its own tolerance
-    pixel: tuple[int, int] | None  # where that one is
-
-    @property
-    def over(self) -> bool:
-        return self.ratio is not None and not self.ratio <= 1
-
-    @property
-    def rank(self) -> tuple[int, float]:
-        """Sorts worst first."""
-        ratio = -1.0 if self.ratio is None else self.ratio
-        return SEVERITY.index(self.check.status), -(math.inf if math.isnan(ratio) else ratio)
-
-
-def check_view(check: Check) -> CheckView:
-    value, expected, tolerance = check.value, check.expected, check.tolerance
-    unit = clean(check.unit)
-    error = None if value is None or expected is None else value - expected
-    ratio = None if error is None or tolerance is None else _ratio(abs(error), tolerance)
-    # Where an expectation is known to very many digits, the error says more than the value does.
-    fine = bool(expected and tolerance and abs(expected) > 1e6 * tolerance)
-    resolution = tolerance if expected and not fine else None
-    digits = 6 if fine else 4
-
-    def text(figure: float | None) -> str:
-        return number(figure, resolution, digits)
-
-    label = clean(check.id.removesuffix(f"/{check.renderer}/{check.against}"))
-    tolerance_text = with_unit(number(tolerance, digits=3), unit)
-    value_text = with_unit(text(value), unit)
-    off = with_unit(number(error, digits=3), unit)
-    limit = (
-        f"≤ {tolerance_text}" if fine or not expected else f"{text(expected)} ± {tolerance_text}"
-    )
-    return CheckView(
-        check=check,
-        label="" if label == clean(check.observable) else label,
-        ratio=ratio,
-        value=value_text,
-        expected=with_unit(text(expected), unit),
-        tolerance=tolerance_text,
-        error=off if expected and error is not None else "",
-        main=f"off by {off}" if fine and error is not None else value_text,
-        limit="" if tolerance is None else limit,
-        used=share(ratio),
-        bar=0.0 if ratio is None else 1.0 if math.isnan(ratio) else min(1.0, ratio),
-        largest=_largest(check),
-        pixel=_worst_pixel(check),
-    )
-
-
-def _largest(check: Check) -> str:
-    most = check.detail.get("max")
-    if check.value is None or not isinstance(most, float) or not most > 1.25 * abs(check.value):
-        return ""
-    return with_unit(number(most, digits=3), clean(check.unit))
-
-
-def _worst_pixel(check: Check) -> tuple[int, int] | None:
-    x, y = (check.detail.get(f"worst_pixel_{axis}") for axis in "xy")
-    return (int(x), int(y)) if isinstance(x, int | float) and isinstance(y, int | float) else None
-
-
-def _ratio(error: float, tolerance: float) -> float:
-    if tolerance > 0:
-        return error / tolerance
-    return 0.0 if error == 0 else math.nan if math.isnan(error) else math.inf
-
-
-def sorted_views(checks: Iterable[Check]) -> list[CheckView]:
-    """Worst first; the order of the record among equals."""
-    return sorted((check_view(check) for check in checks), key=lambda view: view.rank)
 
 
 # --- pictures -------------------------------------------------------------------------------------
@@ -178,6 +89,7 @@ class Cell:
     main: CheckView | None
     checks: int
     bad: int
+    elsewhere: str  # who is off, where all that is bad here is so by comparison with them
     reason: str
     picture: Picture | None
     change: Change | None
@@ -209,7 +121,7 @@ class Row:
     worst: Worst | None
     sort: str
     change: Change | None
-    diagnoses: list[tuple[str, str]]  # (renderer, sentence)
+    diagnoses: list[tuple[str, str, str]]  # (tone, renderer, sentence)
 
 
 @dataclass(frozen=True)
@@ -266,8 +178,15 @@ def row(
         worst=_worst(record, curve, cells, colours, folder) if record else None,
         sort=_sort_keys(cells),
         change=change(case.checks),
-        diagnoses=[(d.renderer, clean(d.sentence)) for d in case.diagnoses],
+        diagnoses=_diagnoses(case),
     )
+
+
+def _diagnoses(case: SummaryCase) -> list[tuple[str, str, str]]:
+    return [
+        (tone, d.renderer, told(d.renderer, d.sentence))
+        for tone, d in ranked(case.diagnoses, case.checks)
+    ]
 
 
 def _sort_keys(cells: Sequence[Cell]) -> str:
@@ -321,6 +240,8 @@ def _cell(
     shown = main_picture(run.images, folder) if run else None
     status = renderer_verdict(renderer, (view.check for view in views), run)
     reason = clean(run.reason) if run and run.status != Verdict.PASS else ""
+    if run and (words := last_words(run)):
+        reason = f"{reason}: {words}" if reason else words
     main = views[0] if views else None
     if not reason and main and main.check.value is None:
         reason = clean(main.check.reason)
@@ -329,12 +250,20 @@ def _cell(
         status=status,
         main=main,
         checks=len(views),
-        bad=sum(view.check.status in (Verdict.FAIL, Verdict.ERROR) for view in views),
+        bad=sum(view.check.status in BAD for view in views),
+        elsewhere=elsewhere(renderer, (view.check for view in views)),
         reason=reason,
         picture=shown,
         change=change(view.check for view in views),
         stored=run is not None and run.stored is not None,
     )
+
+
+def last_words(run: RendererRun) -> str:
+    """The last line of the log of a renderer that did not answer: mostly the exception's."""
+    if run.status != Verdict.ERROR or not run.log_tail.strip():
+        return ""
+    return " ".join(clean(run.log_tail).strip().splitlines()[-1].split())
 
 
 def renderer_verdict(
@@ -351,17 +280,15 @@ def renderer_verdict(
 
 
 def case_order(summary: Summary) -> list[SummaryCase]:
-    """Failures first, worst first; otherwise as the run had them."""
+    """Failures first, worst first, then errors; otherwise as the run had them."""
 
     def rank(case: SummaryCase) -> tuple[int, float]:
-        views = [check_view(check).rank for check in case.checks]
-        return SEVERITY.index(case.status), min(views, default=(0, 0.0))[1]
+        if case.status not in BAD:
+            return FIRST_TO_LOOK_AT.index(case.status), 0.0
+        views = (check_view(check).rank for check in case.checks)
+        return min(views, default=(FIRST_TO_LOOK_AT.index(case.status), 0.0))
 
-    bad = (Verdict.ERROR, Verdict.FAIL)
-    return sorted(
-        summary.cases,
-        key=lambda c: rank(c) if c.status in bad else (SEVERITY.index(c.status), 0.0),
-    )
+    return sorted(summary.cases, key=rank)
 
 
 def renderer_names(summary: Summary) -> list[str]:

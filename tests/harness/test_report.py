@@ -44,7 +44,7 @@ from tests.harness.report_fixture import (
     write_run,
 )
 
-VOID = {"meta", "link", "img", "input", "br", "hr"}
+VOID = {"meta", "link", "img", "input", "br", "hr", "col"}
 POLICY = "default-src 'none'; img-src 'self'; style-src 'self'; script-src 'self'"
 
 
@@ -181,22 +181,24 @@ def test_banner_counts_and_names_the_worst(run: Path) -> None:
     failing = [c for c in checks if c.status == Verdict.FAIL]
     assert f"{len(failing)} of {len(checks)} checks fail" in page.text
     # The printed table is 12.05 degrees off at 80 degrees, with a tolerance of 0.0002 degrees.
-    worst = "snell-lecture[mu=0.67] mytracer internal_angle 12.05° limit ≤ 0.0002°"
+    worst = "snell-lecture[mu=0.67] mytracer internal_angle 12.05° limit ≤\u202f0.0002°"
     assert f"Worst: {worst}" in page.text
 
 
 def test_failures_come_first(run: Path) -> None:
-    statuses = [row["data-status"] for row in Page(run / "index.html").rows()]
-    severity = [verdict.value for verdict in records.SEVERITY]
-    assert statuses == sorted(statuses, key=severity.index)
-    assert {"error", "fail", "skip"} <= set(statuses)
+    rows = Page(run / "index.html").rows()
+    # A wrong number stands before one that is missing, whichever of them is the case's verdict.
+    seen = ["fail" if "fail" in row["data-cells"].split() else row["data-status"] for row in rows]
+    order = ["fail", "error", "skip", "known", "pass"]
+    assert seen == sorted(seen, key=order.index)
+    assert {"error", "fail", "skip"} <= set(seen)
 
 
 def test_matrix_has_a_cell_for_every_renderer(run: Path) -> None:
     page = Page(run / "index.html")
     for row in page.rows():
         assert len(row["data-cells"].split()) == len(PRESENT) + 1
-    assert "mitsuba 3.9.1 ok" in page.text
+    assert "mitsuba 3.9.1 error in 1 of " in page.text
 
 
 def test_missing_renderer_is_shown_with_its_remedy(run: Path) -> None:
@@ -280,7 +282,7 @@ def test_nan_is_shown_as_such(run: Path) -> None:
 def test_differences_share_a_colour_bar_with_their_limit(run: Path) -> None:
     page = case_page(run, "ball-beach")
     assert page.source.count("<linearGradient") == 1
-    assert "1\u202f×\u202f10⁻⁹" in page.text
+    assert "10⁻⁹" in page.text
     assert [a["alt"] for _, a in page.elements if "Difference of" in a.get("alt", "")] == [
         "Difference of tracer and povray",
         "Difference of tracer and mitsuba",
@@ -317,7 +319,7 @@ def test_case_page_shows_what_renderers_were_given(run: Path) -> None:
 def test_all_pass(tmp_path: Path) -> None:
     text = index_of(small_run(tmp_path, passing())).text
     assert "The only check passes" in text
-    closest = "slab-offset[ior=1.5] tracer slab_offset 1\u202f×\u202f10⁻¹³\u202funits"
+    closest = "slab-offset[ior=1.5] tracer slab_offset 10⁻¹³\u202funits"
     assert f"Closest to its limit: {closest}" in text
 
 

@@ -12,8 +12,16 @@ export interface CaseData {
   readonly colours: Readonly<Record<string, string>>; // renderer → class of the stylesheet
   readonly verdicts: Readonly<Record<string, string>>;
   readonly suspects: readonly string[]; // renderers that are said to be off, worst first
+  readonly ray: FirstRay | null;
   readonly absent: readonly { readonly name: string; readonly word: string; readonly reason: string }[];
   readonly curves: readonly CurveData[];
+}
+
+/** Where a renderer is furthest off. */
+export interface FirstRay {
+  readonly renderer: string;
+  readonly probe: string;
+  readonly pixel: readonly [number, number];
 }
 
 export interface CurveData {

@@ -1,5 +1,6 @@
 // The ray of the pinned pixel: its section, its landing points magnified, its figures.
 
+import type { FirstRay } from "./case";
 import { h } from "./dom";
 import { number } from "./format";
 import type { Ray, Rays } from "./rays";
@@ -17,9 +18,15 @@ export class RayPanel {
   private pixel: Pixel | null = null;
   private shownFor = "";
 
-  constructor(private readonly rays: readonly Rays[], private readonly colours: Readonly<Record<string, string>>) {
+  constructor(
+    private readonly rays: readonly Rays[],
+    private readonly colours: Readonly<Record<string, string>>,
+    private readonly first: FirstRay | null,
+  ) {
     rays.forEach((one, k) => this.chooser.append(
       h("option", { value: k }, `probe ${one.probe.name}, path ${one.probe.path || "direct"}`)));
+    const chosen = rays.findIndex((one) => one.probe.name === first?.probe);
+    this.chooser.value = String(Math.max(0, chosen));
     this.chooser.addEventListener("change", () => this.draw());
     this.element = h("section", { id: "ray", class: "ray-panel", "aria-labelledby": "h-ray", hidden: !rays.length },
       h("div", { class: "section-head" }, h("h2", { id: "h-ray" }, "The ray of a pixel"), this.chooser),
@@ -36,7 +43,9 @@ export class RayPanel {
     const rays = this.rays[Number(this.chooser.value) || 0];
     if (!rays) return;
     const { width, height } = rays.probe;
-    const ray = rays.nearest(this.pixel?.x ?? width * 0.68, this.pixel?.y ?? height / 2);
+    const first = rays.probe.name === this.first?.probe ? this.first : null;
+    const ray = rays.nearest(
+      this.pixel?.x ?? first?.pixel[0] ?? width * 0.68, this.pixel?.y ?? first?.pixel[1] ?? height / 2);
     const key = `${this.chooser.value} ${ray.x} ${ray.y} ${this.pixel !== null}`;
     if (key === this.shownFor) return;
     this.shownFor = key;
@@ -44,10 +53,16 @@ export class RayPanel {
       h("figure", { class: "card" }, sectionOf(rays, ray, this.colours)),
       h("div", { class: "ray-facts" },
         h("p", {}, h("b", {}, `Ray of pixel (${ray.x}, ${ray.y})`), ` ${STATUS[ray.status] ?? ""}`,
-          !this.pixel && h("span", { class: "muted" }, "; click a pixel above for another")),
-        interfaceTable(ray), rendererTable(ray, this.colours), landingOf(rays, ray, this.colours),
-        solidView(rays, ray)));
+          !this.pixel && h("span", { class: "muted" }, first && `, where ${first.renderer} is furthest off`,
+            "; click a pixel above for another")),
+        interfaceTable(ray), rendererTable(ray, this.colours),
+        captioned("Landings around the true one", landingOf(rays, ray, this.colours)),
+        captioned("In space; drag to turn", solidView(rays, ray))));
   }
+}
+
+function captioned(text: string, drawing: SVGElement | HTMLElement | null): HTMLElement | null {
+  return drawing && h("figure", {}, drawing, h("figcaption", { class: "muted small" }, text));
 }
 
 function interfaceTable(ray: Ray): HTMLElement | null {

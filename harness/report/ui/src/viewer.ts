@@ -61,7 +61,7 @@ export class Viewer {
     };
     this.state = fromHash(readAddress(), this.initial, this.names);
     this.inspector = new Inspector((pixel) => this.jump(pixel), () => this.unpin());
-    this.rayPanel = new RayPanel(rays, data.colours);
+    this.rayPanel = new RayPanel(rays, data.colours, data.ray);
     this.controls = new Controls(this.names, rays.length > 0, {
       set: (change) => this.update(change),
       fit: () => this.update({ camera: null }),
