@@ -33,7 +33,7 @@ from tracer.scene import (
     ThinSlab,
     Translucent,
 )
-from tracer.shapes import COLUMNS, HOLLOW, Disk, Quadric, Rectangle, Sphere, bound_row
+from tracer.shapes import COLUMNS, HOLLOW, Disk, Plane, Quadric, Rectangle, Sphere, bound_row
 from tracer.shared import Bound, Surfaces
 from tracer.solids import Cell, Compound, compound_rows
 from tracer.tree import Tree, grow_tree, lined_up
@@ -125,7 +125,7 @@ class _Flattener:
                 if not flat and not isinstance(pattern, Constant):
                     raise SceneError(
                         f"{surface.name}: only rectangles and disks can show a pattern, "
-                        f"a {type(surface.shape).__name__} emits a constant radiance"
+                        f"a {type(surface.shape).__name__.lower()} emits a constant radiance"
                     )
                 self.patterns.append(self.pattern(pattern))
                 return EMISSIVE, (0, 0), len(self.patterns) - 1, [0.0] * 7
@@ -175,7 +175,7 @@ class _Flattener:
                 kind, ball = COMPOUND, _ball(center, radius * radius)
                 for row, decisions in zip(rows, compound_rows(where)[1], strict=True):
                     row += [0.0] * (HOLLOW - len(row)) + decisions
-            case Rectangle() | Disk():
+            case Rectangle() | Disk() | Plane():
                 kind, rows = DISK if isinstance(shape, Disk) else RECTANGLE, [face_row(shape)]
             case Mesh():
                 kind, first, count = MESH, self.nodes, self.triangles

@@ -1,15 +1,19 @@
-"""Rectangles and disks: faces that belong to no solid, met from either side."""
+"""Rectangles, disks and whole planes: faces that belong to no solid, met from either side."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from tracer.compiled import inlined
-from tracer.shapes import INF, Disk, Rectangle, Rows, vec_at
-from tracer.vector import Vec, along, dot, sub
+from tracer.shapes import INF, Disk, Plane, Rectangle, Rows, vec_at
+from tracer.vector import Vec, along, dot, scale, sub
 
 
-def face_row(face: Rectangle | Disk) -> list[float]:
+def face_row(face: Rectangle | Disk | Plane) -> list[float]:
+    """A plane is a rectangle that ends nowhere; it needs no axes, as nothing on it has a place."""
+    if isinstance(face, Plane):
+        center = scale(face.offset, face.normal)
+        return [*center, *(0.0,) * 6, *face.normal, INF, INF]
     half = (face.radius,) * 2 if isinstance(face, Disk) else (face.size[0] / 2, face.size[1] / 2)
     return [*face.origin, *face.x, *face.y, *face.z, *half]
 

@@ -177,19 +177,6 @@ def thin_slab_offset(theta_i: float, thickness: float, ior: float) -> tuple[bool
 
 
 @compiled
-def cross_slab(
-    wi: Vec, n: Vec, thickness: float, ior_outside: float, ior_slab: float
-) -> tuple[bool, Vec, float]:
-    """(transmits, exit - entry, length inside): the way of a ray through a slab, face to face."""
-    transmits, wt = refract(wi, n, ior_outside, ior_slab)
-    cos_theta_t = -dot(wt, n)
-    if not transmits or cos_theta_t <= 0.0:
-        return False, (0.0, 0.0, 0.0), 0.0
-    length = thickness / cos_theta_t
-    return True, scale(length, wt), length
-
-
-@compiled
 def slab_transmittance(R: float, a: float) -> float:
     """What a slab transmits, all internal reflections included.
 

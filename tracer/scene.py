@@ -9,13 +9,13 @@ from tracer.camera import Camera
 from tracer.errors import SceneError
 from tracer.mesh import Mesh
 from tracer.patterns import Pattern, Picture
-from tracer.shapes import Disk, Rectangle, Sphere
+from tracer.shapes import Disk, Plane, Rectangle, Sphere
 from tracer.solids import Cell, Compound
 from tracer.spectrum import LINE_D, Dispersion
 from tracer.vector import Vec
 
 SolidShape = Sphere | Cell | Compound | Mesh
-Shape = SolidShape | Rectangle | Disk
+Shape = SolidShape | Rectangle | Disk | Plane
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,11 @@ class Medium:
 VACUUM = Medium(1.0)
 
 
+def _require_end(shape: Shape, name: str) -> None:
+    if isinstance(shape, Compound) and not math.isfinite(shape.radius):
+        raise SceneError(f"{name}: goes on for ever; half-spaces must cut something that ends")
+
+
 @dataclass(frozen=True)
 class Solid:
     """A closed shape filled with `medium`.
@@ -57,6 +62,9 @@ class Solid:
     medium: Medium
     priority: int = 0
     name: str = "solid"
+
+    def __post_init__(self) -> None:
+        _require_end(self.shape, self.name)
 
 
 @dataclass(frozen=True)
@@ -139,6 +147,9 @@ class Surface:
     shape: Shape
     material: Material
     name: str = "surface"
+
+    def __post_init__(self) -> None:
+        _require_end(self.shape, self.name)
 
 
 @dataclass(frozen=True)

@@ -55,10 +55,20 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Plane:
-    """The half-space ``normal . p <= offset``; `normal` is unit and points outwards."""
+    """The half-space ``normal . p <= offset``; `normal` is unit and points outwards.
+
+    As the shape of a surface it is the plane that ends it, whose front is where `normal` points.
+    """
 
     normal: Vec
     offset: float
+
+    def __post_init__(self) -> None:
+        if not (abs(math.hypot(*self.normal) - 1.0) < 1e-9 and abs(self.offset) < INF):
+            raise SceneError(
+                "plane: needs a unit normal and a finite offset, "
+                f"not {self.normal} and {self.offset}"
+            )
 
 
 @dataclass(frozen=True)

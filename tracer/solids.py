@@ -23,7 +23,7 @@ from tracer.shapes import (
     Sphere,
     require_positive,
 )
-from tracer.vector import Vec
+from tracer.vector import Vec, along, dot, scale
 
 Bound = Plane | Quadric
 
@@ -68,13 +68,16 @@ class Compound:
 
 
 Analytic = Sphere | Cell | Compound
+Part = Analytic | Plane  # a half-space, which ends nowhere until it cuts something that does
 
 
 # --- set operations -------------------------------------------------------------------------------
 
 
-def _where(solid: Analytic) -> Where:
-    match solid:
+def _where(part: Part) -> Where:
+    match part:
+        case Plane():
+            return Side(part)
         case Sphere(center, radius):
             return Side(Quadric(center, (0.0, 0.0, 1.0), radius * radius, 0.0, -1.0))
         case Cell(bounds):
@@ -94,27 +97,33 @@ def _outside(where: Where) -> Where:
             return AllOf(tuple(map(_outside, parts)))
 
 
-def union(*solids: Analytic) -> Compound:
-    """What is inside any of the solids. Faces that they share are no faces of it."""
-    center, radius = _ball_around(solids)
-    return Compound(AnyOf(tuple(map(_where, solids))), center, radius)
+def union(*parts: Part) -> Compound:
+    """What is inside any of the parts. Faces that they share are no faces of it."""
+    return Compound(AnyOf(tuple(map(_where, parts))), *_ball_around(parts))
 
 
-def intersection(*solids: Analytic) -> Compound:
-    """What is inside all of the solids."""
-    smallest = min(solids, key=lambda solid: solid.radius)
-    return Compound(AllOf(tuple(map(_where, solids))), smallest.center, smallest.radius)
+def intersection(*parts: Part) -> Compound:
+    """What is inside all of the parts."""
+    smallest = min(map(_ball, parts), key=lambda ball: ball[1])
+    return Compound(AllOf(tuple(map(_where, parts))), *smallest)
 
 
-def difference(solid: Analytic, *without: Analytic) -> Compound:
-    """What is inside of one solid, and outside of all others."""
-    parts = (_where(solid), *(_outside(_where(other)) for other in without))
-    return Compound(AllOf(parts), solid.center, solid.radius)
+def difference(part: Part, *without: Part) -> Compound:
+    """What is inside of one part, and outside of all others."""
+    where = (_where(part), *(_outside(_where(other)) for other in without))
+    return Compound(AllOf(where), *_ball(part))
 
 
-def _ball_around(solids: Sequence[Analytic]) -> tuple[Vec, float]:
-    centers = np.array([solid.center for solid in solids])
-    radii = np.array([solid.radius for solid in solids])
+def _ball(part: Part) -> tuple[Vec, float]:
+    """(center, radius) of a sphere around it, as far as its parts tell."""
+    return ((0.0, 0.0, 0.0), INF) if isinstance(part, Plane) else (part.center, part.radius)
+
+
+def _ball_around(parts: Sequence[Part]) -> tuple[Vec, float]:
+    balls = list(map(_ball, parts))
+    if any(radius == INF for _, radius in balls):
+        return (0.0, 0.0, 0.0), INF
+    centers, radii = (np.array(column) for column in zip(*balls, strict=True))
     low, high = (centers - radii[:, None]).min(axis=0), (centers + radii[:, None]).max(axis=0)
     x, y, z = ((low + high) / 2.0).tolist()
     reach = np.linalg.norm(centers - (x, y, z), axis=1) + radii
@@ -170,7 +179,7 @@ def cylinder(center: Vec, axis: Vec, radius: float, height: float) -> Cell:
     require_positive("cylinder", radius=radius, height=height)
     side = Quadric(center, axis, radius * radius, 0.0, 0.0)
     half = height / 2.0
-    ends = _up_to(half, axis, center), _up_to(half, _reverse(axis), center)
+    ends = _up_to(half, axis, center), _up_to(half, scale(-1.0, axis), center)
     return Cell((side, *ends), center, math.hypot(radius, half))
 
 
@@ -187,8 +196,8 @@ def cone(tip: Vec, axis: Vec, radius: float, height: float, tip_radius: float = 
     side = Quadric(tip, axis, tip_radius**2, 2.0 * tip_radius * slope, slope * slope)
     bounds: list[Bound] = [side, _up_to(height, axis, tip)]
     if tip_radius > 0.0:
-        bounds.append(_up_to(0.0, _reverse(axis), tip))
-    return Cell(tuple(bounds), _along(tip, height / 2.0, axis), math.hypot(radius, height / 2.0))
+        bounds.append(_up_to(0.0, scale(-1.0, axis), tip))
+    return Cell(tuple(bounds), along(tip, height / 2.0, axis), math.hypot(radius, height / 2.0))
 
 
 def lens(
@@ -207,18 +216,18 @@ def lens(
     below -1 a hyperboloid, otherwise an ellipsoid.
     """
     require_positive("lens", thickness=thickness, aperture=aperture)
-    back = _along(front, thickness, axis)
+    back = along(front, thickness, axis)
     edge = Side(Quadric(front, axis, aperture * aperture, 0.0, 0.0))
     parts = [
         edge,
         *_lens_side(front, axis, radii[0], conics[0], thickness, aperture),
-        *_lens_side(back, _reverse(axis), -radii[1], conics[1], thickness, aperture),
+        *_lens_side(back, scale(-1.0, axis), -radii[1], conics[1], thickness, aperture),
     ]
     depth = thickness / 2.0 + max(
         sag(r, k, aperture) if r < 0.0 else 0.0
         for r, k in zip((radii[0], -radii[1]), conics, strict=True)
     )
-    center, ball = _along(front, thickness / 2.0, axis), math.hypot(aperture, depth)
+    center, ball = along(front, thickness / 2.0, axis), math.hypot(aperture, depth)
     bounds = [part.bound for part in parts if isinstance(part, Side) and not part.hollow]
     if len(bounds) == len(parts):
         return Cell(tuple(bounds), center, ball)
@@ -243,7 +252,7 @@ def _lens_side(
     vertex: Vec, inwards: Vec, radius: float, conic: float, thickness: float, aperture: float
 ) -> list[Where]:
     """Bounds of a lens at one side; `radius` is positive where that is convex."""
-    outwards = _reverse(inwards)
+    outwards = scale(-1.0, inwards)
     if abs(radius) == INF:
         return [Side(_up_to(0.0, outwards, vertex))]
     if not abs(radius) > 0.0:
@@ -262,13 +271,4 @@ def _lens_side(
 
 def _up_to(height: float, axis: Vec, point: Vec) -> Plane:
     """Everything that is not more than `height` along `axis` from `point`."""
-    return Plane(axis, height + sum(p * a for p, a in zip(point, axis, strict=True)))
-
-
-def _reverse(axis: Vec) -> Vec:
-    return -axis[0], -axis[1], -axis[2]
-
-
-def _along(point: Vec, distance: float, axis: Vec) -> Vec:
-    x, y, z = (p + distance * a for p, a in zip(point, axis, strict=True))
-    return x, y, z
+    return Plane(axis, height + dot(point, axis))

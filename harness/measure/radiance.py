@@ -26,6 +26,7 @@ from harness.scene.resolved import (
     Orthographic,
     Panorama,
     Pattern,
+    Plane,
     Ramp,
     Rectangle,
     ResolvedScene,
@@ -70,10 +71,14 @@ def _around(background: Rgb | Panorama, directions: Float) -> Float:
     return np.array(background)
 
 
-def _rectangle(surface: Surface) -> Rectangle:
-    if not isinstance(surface.shape, Rectangle):
+def _face(surface: Surface) -> Rectangle | Plane:
+    if not isinstance(surface.shape, Rectangle | Plane):
         raise ValueError(f"the {surface.shape.type} '{surface.name}' has no closed form here")
     return surface.shape
+
+
+def _normal(face: Rectangle | Plane) -> Float:
+    return np.array(face.normal if isinstance(face, Plane) else face.frame.z)
 
 
 def _local(face: Rectangle, point: Float) -> tuple[Float, Float]:
@@ -84,12 +89,16 @@ def _local(face: Rectangle, point: Float) -> tuple[Float, Float]:
 def _nearest(scene: ResolvedScene, rays: Rays, after: Float) -> tuple[Float, Float]:
     best, which = np.full(len(after), np.inf), np.full(len(after), -1)
     for index, surface in enumerate(scene.surfaces):
-        face = _rectangle(surface)
-        z = np.array(face.frame.z)
+        face = _face(surface)
+        z = _normal(face)
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = ((np.array(face.frame.origin) - rays.origins) @ z) / (rays.directions @ z)
-            x, y = _local(face, rays.origins + t[:, None] * rays.directions)
-            hit = (t > after) & (np.abs(x) < face.size[0] / 2) & (np.abs(y) < face.size[1] / 2)
+            if isinstance(face, Plane):
+                t = (face.offset - rays.origins @ z) / (rays.directions @ z)
+                hit = (t > after) & np.isfinite(t)
+            else:
+                t = ((np.array(face.frame.origin) - rays.origins) @ z) / (rays.directions @ z)
+                x, y = _local(face, rays.origins + t[:, None] * rays.directions)
+                hit = (t > after) & (np.abs(x) < face.size[0] / 2) & (np.abs(y) < face.size[1] / 2)
         nearer = hit & (t < best)
         best, which = np.where(nearer, t, best), np.where(nearer, index, which)
     return best, which
@@ -97,13 +106,16 @@ def _nearest(scene: ResolvedScene, rays: Rays, after: Float) -> tuple[Float, Flo
 
 def _shade(scene: ResolvedScene, surface: Surface, point: Float) -> tuple[Float, Float, Float]:
     """What a face sends towards the camera, what it lets pass, and how near its edges are."""
-    face, material = _rectangle(surface), surface.material
-    x, y = _local(face, point)
-    width, height = face.size
-    edge = np.minimum(width / 2 - np.abs(x), height / 2 - np.abs(y))
-    nothing = np.zeros((len(point), 3))
+    face, material = _face(surface), surface.material
+    nothing, edge = np.zeros((len(point), 3)), np.full(len(point), np.inf)
+    if isinstance(face, Rectangle):
+        x, y = _local(face, point)
+        width, height = face.size
+        edge = np.minimum(width / 2 - np.abs(x), height / 2 - np.abs(y))
     match material:
-        case Emissive():
+        case Emissive(pattern=Constant(radiance=radiance)):
+            return np.broadcast_to(np.array(radiance), nothing.shape), nothing, edge
+        case Emissive() if isinstance(face, Rectangle):
             emitted, cell = _emission(material.pattern, x / width + 0.5, y / height + 0.5, face)
             return emitted, nothing, np.minimum(edge, cell)
         case Translucent():
@@ -117,17 +129,18 @@ def _shade(scene: ResolvedScene, surface: Surface, point: Float) -> tuple[Float,
     raise ValueError(f"{material.type} has no closed form here")
 
 
-def _irradiance(scene: ResolvedScene, face: Rectangle, point: Float) -> Float:
+def _irradiance(scene: ResolvedScene, face: Rectangle | Plane, point: Float) -> Float:
     """I cos(theta) / r^2 and, of light from far away, E cos(theta), of all lights in front."""
+    normal = _normal(face)
     total = np.zeros((len(point), 3))
     for light in scene.lights:
         if isinstance(light, DirectionalLight):
-            slope = max(-float(np.dot(light.direction, face.frame.z)), 0.0)
+            slope = max(-float(np.dot(light.direction, normal)), 0.0)
             total += slope * np.array(light.irradiance)
             continue
         way = np.array(light.position) - point
         r2 = np.einsum("ij,ij->i", way, way)
-        cos = np.maximum(way @ np.array(face.frame.z), 0) / np.sqrt(r2)
+        cos = np.maximum(way @ normal, 0) / np.sqrt(r2)
         total += (cos / r2)[:, None] * np.array(light.intensity)
     return total
 
@@ -135,8 +148,6 @@ def _irradiance(scene: ResolvedScene, face: Rectangle, point: Float) -> Float:
 def _emission(pattern: Pattern, u: Float, v: Float, face: Rectangle) -> tuple[Float, Float]:
     far = np.full(len(u), np.inf)
     match pattern:
-        case Constant():
-            return np.broadcast_to(np.array(pattern.radiance), (len(u), 3)), far
         case Ramp():
             c = u if pattern.axis == "u" else v
             return (1 - c)[:, None] * np.array(pattern.start) + c[:, None] * np.array(
@@ -215,6 +226,9 @@ def footprint(scene: ResolvedScene) -> float:
     camera = scene.camera
     if isinstance(camera, Orthographic):
         return 2 * camera.width / scene.film.width
-    far = max(float(np.linalg.norm(np.array(_rectangle(s).frame.origin) - camera.origin))
-              for s in scene.surfaces)  # fmt: skip
+    faces = [_face(surface) for surface in scene.surfaces]
+    if any(isinstance(face, Plane) for face in faces):
+        raise Unmeasurable("the mean over a pixel that sees a horizon has no closed form")
+    far = max(float(np.linalg.norm(np.array(face.frame.origin) - camera.origin))
+              for face in faces if isinstance(face, Rectangle))  # fmt: skip
     return float(2 * np.sqrt(2) * 2 * camera.tan_half_fov_x / scene.film.width * far * 1.5)

@@ -36,8 +36,10 @@ class Capability(enum.StrEnum):
     LENS = "lens"  # with spherical or plane faces
     CONIC = "conic"  # lenses of other conics, too
     CSG = "csg"  # unions, intersections and differences of what else it has
+    HALF_SPACE = "half-space"  # as parts of these
     MESH = "mesh"
     SMOOTH_MESH = "smooth-mesh"
+    PLANE = "plane"  # surfaces that go on for ever
     THIN_SLAB = "thin-slab"  # the lecture's thin face; others are given a real slab
     MIRROR = "mirror"
     DIFFUSE = "diffuse"  # with point lights

@@ -36,6 +36,8 @@ USUAL_CLAIMS = frozenset(Capability) - {
     Capability.DOUBLE_DATA,
     Capability.LOBE_SWITCH,
     Capability.THIN_SLAB,
+    Capability.HALF_SPACE,
+    Capability.PLANE,
     Capability.PRIORITY,
     Capability.ENVIRONMENT,
     Capability.SAMPLING,

@@ -69,6 +69,7 @@ EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
     Capability.CONIC,
     Capability.CONE,
     Capability.CSG,
+    Capability.HALF_SPACE,
     Capability.PRIORITY,
     Capability.SAMPLING,
 }

@@ -17,6 +17,7 @@ _SHAPES = {
     resolved.Lens: Capability.LENS,
     resolved.Csg: Capability.CSG,
     resolved.Mesh: Capability.MESH,
+    resolved.Plane: Capability.PLANE,
 }
 _MATERIALS = {
     resolved.Mirror: Capability.MIRROR,
@@ -99,7 +100,10 @@ def _of_shape(shape: resolved.SurfaceShape, place: str) -> Iterator[tuple[Capabi
         yield Capability.CONIC, f"{place} has faces that are no spheres"
     if isinstance(shape, resolved.Csg):
         for part in shape.parts:
-            yield from _of_shape(part, place)
+            if isinstance(part, resolved.Plane):
+                yield Capability.HALF_SPACE, f"{place} is cut by a half-space"
+            else:
+                yield from _of_shape(part, place)
     if isinstance(shape, resolved.Mesh) and shape.normals is not None:
         yield Capability.SMOOTH_MESH, f"{place} is shaded smoothly"
 

@@ -98,6 +98,8 @@ class PovRayRenderer:
             Capability.LENS,
             Capability.CONIC,
             Capability.CSG,
+            Capability.HALF_SPACE,
+            Capability.PLANE,
             Capability.MESH,
             Capability.SMOOTH_MESH,
             Capability.MIRROR,

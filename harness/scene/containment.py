@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from harness.scene import resolved
 from harness.scene.regions import depth, ends, profile, region
 from harness.scene.tessellation import distance, winding
+from harness.scene.vectors import any_frame
 
 Points = NDArray[np.float64]  # (n, 3)
 
@@ -27,7 +28,9 @@ class Relation(enum.Enum):
     OVERLAP = enum.auto()
 
 
-def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.float64]:
+def signed_distance(
+    shape: resolved.SolidShape | resolved.Plane, points: Points
+) -> NDArray[np.float64]:
     """Negative inside, positive outside, 0 on the surface; (n,) in scene units.
 
     A lower bound of the distance outside edges of convex solids and cylinders, exact elsewhere.
@@ -45,7 +48,7 @@ def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.fl
             along = local @ axis
             across = np.linalg.norm(local - along[:, None] * axis, axis=1)
             return np.asarray(np.maximum(across - shape.radius, np.abs(along) - shape.height / 2))
-        case resolved.Cone() | resolved.Lens() | resolved.Csg():
+        case resolved.Cone() | resolved.Lens() | resolved.Csg() | resolved.Plane():
             return depth(region(shape), points)
         case resolved.Mesh():
             vertices, triangles = np.array(shape.vertices), np.array(shape.triangles)
@@ -54,7 +57,7 @@ def signed_distance(shape: resolved.SolidShape, points: Points) -> NDArray[np.fl
 
 
 def bounds(shape: resolved.SurfaceShape) -> tuple[Points, Points]:
-    """Smallest and largest coordinates of a shape, each (3,)."""
+    """Smallest and largest coordinates of a shape, each (3,); of a plane, infinite ones."""
     match shape:
         case resolved.Sphere():
             center = np.array(shape.center)
@@ -74,19 +77,25 @@ def bounds(shape: resolved.SurfaceShape) -> tuple[Points, Points]:
             return _around_rings(
                 shape.frame, [(0.0, shape.radius), (shape.height, shape.top_radius)]
             )
+        case resolved.Plane():
+            return np.full(3, -np.inf), np.full(3, np.inf)
         case resolved.Csg():
-            lows, highs = zip(*map(bounds, shape.parts), strict=True)
-            match shape.operation:
-                case "union":
-                    return np.min(lows, axis=0), np.max(highs, axis=0)
-                case "intersection":
-                    return np.max(lows, axis=0), np.min(highs, axis=0)
-                case "difference":
-                    return lows[0], highs[0]
+            return _bounds_of_all(shape)
         case resolved.Lens():
             return _around_rings(shape.frame, [(z, shape.aperture) for z in ends(shape)])
     origin = np.array(shape.frame.origin)
     return origin - reach, origin + reach
+
+
+def _bounds_of_all(shape: resolved.Csg) -> tuple[Points, Points]:
+    lows, highs = zip(*map(bounds, shape.parts), strict=True)
+    match shape.operation:
+        case "union":
+            return np.min(lows, axis=0), np.max(highs, axis=0)
+        case "intersection":
+            return np.max(lows, axis=0), np.min(highs, axis=0)
+        case "difference":
+            return lows[0], highs[0]
 
 
 def _around_rings(
@@ -186,10 +195,36 @@ def _samples(shape: resolved.SolidShape, towards: Points) -> Points:
 
 def _composed_samples(shape: resolved.Csg, towards: Points) -> Points:
     """Points of its parts' surfaces that are on its own."""
-    points = np.concatenate([_samples(part, towards) for part in shape.parts])
+    low, high = bounds(shape)
+    points = np.concatenate(
+        [
+            _plane_samples(part, (low + high) / 2, float(np.linalg.norm(high - low)) / 2)
+            if isinstance(part, resolved.Plane)
+            else _samples(part, towards)
+            for part in _leaves(shape)
+        ]
+    )
     within = ON_SURFACE * np.abs(points).max()
     where = region(shape)
     return np.asarray(points[np.abs(depth(where, points)) <= within])
+
+
+def _leaves(shape: resolved.Csg) -> Iterator[resolved.Part]:
+    """The parts of a composed solid that are not composed themselves."""
+    for part in shape.parts:
+        if isinstance(part, resolved.Csg):
+            yield from _leaves(part)
+        else:
+            yield part
+
+
+def _plane_samples(plane: resolved.Plane, center: Points, radius: float) -> Points:
+    """Points of a plane within a ball, on circles about the foot of its centre."""
+    n = np.array(plane.normal)
+    foot = center + (plane.offset - center @ n) * n
+    frame = any_frame(tuple(foot.tolist()), plane.normal)
+    assert frame is not None  # a plane's normal is a unit vector
+    return _ring_samples(frame, [(0.0, radius * share) for share in np.linspace(0, 1, 9)])
 
 
 def _sphere_directions() -> Points:

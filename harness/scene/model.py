@@ -29,7 +29,9 @@ from harness.scene.shape_model import MeshData as MeshData
 from harness.scene.shape_model import MeshFile as MeshFile
 from harness.scene.shape_model import Name as Name
 from harness.scene.shape_model import NonNegative as NonNegative
+from harness.scene.shape_model import PartShape as PartShape
 from harness.scene.shape_model import Placed as Placed
+from harness.scene.shape_model import Plane as Plane
 from harness.scene.shape_model import Positive as Positive
 from harness.scene.shape_model import Prism as Prism
 from harness.scene.shape_model import Radius as Radius

@@ -62,7 +62,10 @@ def _extent(scene: ResolvedScene) -> float:
     """The largest coordinate of the scene."""
     corners = [np.array(scene.camera.origin)]
     for shape in (*(s.shape for s in scene.solids), *(s.shape for s in scene.surfaces)):
-        corners += bounds(shape)
+        if isinstance(shape, resolved.Plane):
+            corners.append(shape.offset * np.array(shape.normal))  # the nearest of its points
+        else:
+            corners += bounds(shape)
     return float(np.max(np.abs(corners)))
 
 

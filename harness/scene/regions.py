@@ -66,7 +66,7 @@ class Either:
 Region = Side | Both | Either
 
 
-def region(shape: resolved.Analytic) -> Region:
+def region(shape: resolved.Part) -> Region:
     """The points of a shape."""
     match shape:
         case resolved.Sphere():
@@ -82,6 +82,8 @@ def region(shape: resolved.Analytic) -> Region:
             return _cone(shape)
         case resolved.Lens():
             return _lens(shape)
+        case resolved.Plane():
+            return Side(HalfSpace(shape.normal, shape.offset))
         case resolved.Csg():
             return _composed(shape)
 
@@ -214,7 +216,7 @@ def _beyond(bound: Round, points: Points) -> Values:
     return np.asarray(away)
 
 
-def thickness(shape: resolved.SolidShape) -> float:
+def thickness(shape: resolved.SolidShape | resolved.Plane) -> float:
     """How thick a solid is where it is thinnest, as far as its bounds tell."""
     match shape:
         case resolved.Sphere():
@@ -230,5 +232,7 @@ def thickness(shape: resolved.SolidShape) -> float:
             return float(depths.min())
         case resolved.Csg():
             return min(map(thickness, shape.parts))
+        case resolved.Plane():
+            return math.inf
         case resolved.Mesh():
             return float(np.ptp(np.array(shape.vertices), axis=0).min())

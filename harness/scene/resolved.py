@@ -138,26 +138,40 @@ class Disk(Frozen):
     radius: float
 
 
+class Plane(Frozen):
+    """Where ``n . p = d``, without end: n is the unit `normal`, d the `offset`.
+
+    A surface's front is where the normal points. As a part of a composed solid it is the half-space
+    behind it, ``n . p <= d``.
+    """
+
+    type: Literal["plane"] = "plane"
+    normal: Vec3
+    offset: float
+
+
 class Csg(Frozen):
     """Solids composed as sets: what is in any, in all, or in the first and none of the others.
 
-    Parts may share faces; in a union these are none of it, in a difference they are.
+    Parts may share faces; in a union these are none of it, in a difference they are. Parts that are
+    planes cut what ends: the whole never goes on for ever.
     """
 
     type: Literal["csg"] = "csg"
     operation: Literal["union", "intersection", "difference"]
-    parts: tuple[AnalyticShape, ...]
+    parts: tuple[PartShape, ...]
 
 
 Analytic = Sphere | Convex | Cylinder | Cone | Lens | Csg
-AnalyticShape = Annotated[
-    Sphere | Convex | Cylinder | Cone | Lens | Csg, Field(discriminator="type")
+Part = Analytic | Plane
+PartShape = Annotated[
+    Sphere | Convex | Cylinder | Cone | Lens | Csg | Plane, Field(discriminator="type")
 ]
 SolidShape = Annotated[
     Sphere | Convex | Cylinder | Cone | Lens | Csg | Mesh, Field(discriminator="type")
 ]
 SurfaceShape = Annotated[
-    Sphere | Convex | Cylinder | Cone | Lens | Csg | Mesh | Rectangle | Disk,
+    Sphere | Convex | Cylinder | Cone | Lens | Csg | Mesh | Rectangle | Disk | Plane,
     Field(discriminator="type"),
 ]
 

@@ -173,10 +173,21 @@ class AsMesh(Strict):
     of: Annotated[Box | Slab | Prism | Wedge, Field(discriminator="type")]
 
 
+class Plane(Placed):
+    """Through `center`, without end; `normal` points to its front.
+
+    In a composed solid it is the half-space behind it.
+    """
+
+    type: Literal["plane"]
+    center: Vec3 = (0, 0, 0)
+    normal: Vec3 = (0, 0, 1)
+
+
 class Composed(Strict):
     """Solids composed as sets; each part has a place of its own."""
 
-    of: Annotated[tuple[AnalyticShape, ...], Field(min_length=2)]
+    of: Annotated[tuple[PartShape, ...], Field(min_length=2)]
 
 
 class Union(Composed):
@@ -197,7 +208,7 @@ class Difference(Composed):
     type: Literal["difference"]
 
 
-AnalyticShape = Annotated[
+PartShape = Annotated[
     Sphere
     | Box
     | Slab
@@ -206,6 +217,7 @@ AnalyticShape = Annotated[
     | Cylinder
     | Cone
     | Lens
+    | Plane
     | Union
     | Intersection
     | Difference,
@@ -240,6 +252,7 @@ SolidShape = Annotated[
     | Cylinder
     | Cone
     | Lens
+    | Plane
     | Union
     | Intersection
     | Difference
@@ -250,6 +263,6 @@ SolidShape = Annotated[
     Field(discriminator="type"),
 ]
 SurfaceShape = Annotated[
-    Rectangle | Disk | Sphere | Box | Cylinder | Cone | Icosphere | MeshFile | MeshData,
+    Rectangle | Disk | Plane | Sphere | Box | Cylinder | Cone | Icosphere | MeshFile | MeshData,
     Field(discriminator="type"),
 ]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.scene import lenses, model, resolved
+from harness.scene.containment import bounds
 from harness.scene.degrees import cosd, sind
 from harness.scene.findings import Attempts, Finding, SceneInvalid, quoted
 from harness.scene.resolved import Vec3
@@ -72,8 +73,12 @@ def solid_shape(shape: model.SolidShape, folder: Path) -> resolved.SolidShape:
             return lenses.cone(shape, _along_axis(shape, shape.center))
         case model.Lens():
             return lenses.lens(shape, _along_axis(shape, shape.vertex))
+        case model.Plane():
+            message = "a plane ends nowhere: it bounds no solid by itself"
+            expected = "a part of an intersection or difference, which it cuts"
+            raise SceneInvalid(Finding(("type",), message, quoted(shape.type), expected))
         case model.Union() | model.Intersection() | model.Difference():
-            return _composed(shape, folder)
+            return _whole(_composed(shape, folder))
         case model.Icosphere():
             return _icosphere(shape)
         case model.MeshFile() | model.MeshData():
@@ -86,6 +91,8 @@ def surface_shape(shape: model.SurfaceShape, folder: Path) -> resolved.SurfaceSh
         return rectangle(shape)
     if isinstance(shape, model.Disk):
         return resolved.Disk(frame=_face_frame(shape), radius=shape.radius)
+    if isinstance(shape, model.Plane):
+        return _plane(shape)
     if isinstance(shape, model.MeshFile | model.MeshData):
         return _mesh(shape, folder)
     return solid_shape(shape, folder)
@@ -139,16 +146,40 @@ def _face_frame(shape: model.Rectangle | model.Disk | model.Wedge) -> resolved.F
     return _turned_frame(base, turn_of(shape))
 
 
+def _plane(shape: model.Plane) -> resolved.Plane:
+    base = any_frame(_vec(shape.center), _vec(shape.normal))
+    if base is None:
+        raise _no_direction(("normal",), shape.normal)
+    normal = turned(turn_of(shape), base.z)
+    return resolved.Plane(normal=normal, offset=float(exact_dot(normal, base.origin)))
+
+
 def _composed(
     shape: model.Union | model.Intersection | model.Difference, folder: Path
 ) -> resolved.Csg:
     attempts = Attempts()
-    parts = [
-        attempts.attempt(("of", k), solid_shape, part, folder) for k, part in enumerate(shape.of)
-    ]
+    parts = [attempts.attempt(("of", k), _part, part, folder) for k, part in enumerate(shape.of)]
     attempts.raise_any()
-    analytic = tuple(part for part in parts if isinstance(part, resolved.Analytic))
+    analytic = tuple(part for part in parts if isinstance(part, resolved.Part))
     return resolved.Csg(operation=shape.type, parts=analytic)
+
+
+def _part(shape: model.PartShape, folder: Path) -> resolved.SolidShape | resolved.Plane:
+    match shape:
+        case model.Plane():
+            return _plane(shape)
+        case model.Union() | model.Intersection() | model.Difference():
+            return _composed(shape, folder)
+    return solid_shape(shape, folder)
+
+
+def _whole(shape: resolved.Csg) -> resolved.Csg:
+    """The composed solid, where half-spaces leave it an end; raises SceneInvalid."""
+    if not np.isfinite(bounds(shape)).all():
+        message = "goes on for ever: a half-space among its parts is cut by nothing"
+        expected = "a part that ends, in an intersection with the half-space or before it is cut"
+        raise SceneInvalid(Finding(("of",), message, None, expected))
+    return shape
 
 
 def _along_axis(shape: model.Cylinder | model.Cone | model.Lens, origin: Vec3) -> resolved.Frame:
@@ -348,6 +379,8 @@ def smallest_feature(shape: resolved.SurfaceShape) -> float:
             return min(map(smallest_feature, shape.parts))
         case resolved.Rectangle():
             return min(shape.size)
+        case resolved.Plane():
+            return math.inf
         case resolved.Mesh():
             return float(np.ptp(np.array(shape.vertices), axis=0).max())
         case resolved.Convex():

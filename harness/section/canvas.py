@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.record import RayPath
-from harness.scene.resolved import ResolvedScene, Solid, SurfaceShape
+from harness.scene.resolved import Plane, ResolvedScene, Solid, SurfaceShape
 from harness.section.outline import Cut, Points, Window, along_face, outline
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
@@ -89,6 +89,8 @@ class Canvas:
         ends = along_face(shape, self.cut)
         if ends is not None:
             a, b = self._flat(ends)
+            if isinstance(shape, Plane):
+                a, b = _clipped(a, b, (0.0, 0.0, WIDTH, self.height)) or (a, a)
             self._line("face", a, b, "#e0a100" if glows else "#8a94a0", 3.5)
 
     def ray(self, path: RayPath, colour: str = RAY) -> None:

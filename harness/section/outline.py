@@ -16,13 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.scene.containment import bounds, signed_distance
-from harness.scene.resolved import Convex, Disk, Mesh, Rectangle, SolidShape
+from harness.scene.resolved import Convex, Disk, Frame, Mesh, Plane, Rectangle, SolidShape
+from harness.scene.vectors import any_frame
 
 Points = NDArray[np.float64]
 Field = Callable[[Points], NDArray[np.float64]]
 
 CELLS = 160  # of the grid along its longer side
 HALVINGS = 30
+FAR = 1e6  # scene units
 CORNER = 0.9  # cosine between two normals below which there is a corner between them
 
 
@@ -80,25 +82,31 @@ def outline(shape: SolidShape, cut: Cut, window: Window) -> list[Points]:
 
 
 def along_face(shape: object, cut: Cut) -> Points | None:
-    """The segment (2, 2) in which a rectangle or disk meets the plane; None where it does not."""
-    if not isinstance(shape, Rectangle | Disk):
+    """The segment (2, 2) in which an open face meets the plane; None where it does not.
+
+    Of a face that goes on for ever, as much as is `FAR` to both sides.
+    """
+    frame = _frame_of(shape)
+    if frame is None:
         return None
-    x, y, z = (np.array(axis) for axis in (shape.frame.x, shape.frame.y, shape.frame.z))
+    x, y, z = (np.array(axis) for axis in (frame.x, frame.y, frame.z))
     line = np.cross(cut.n, z)
     if np.linalg.norm(line) < 1e-9:
         return None
     line = line / np.linalg.norm(line)
     across = np.cross(z, line)  # in the face, towards the plane
-    center = np.array(shape.frame.origin)
+    center = np.array(frame.origin)
     foot = center - (center - cut.origin) @ cut.n / (across @ cut.n) * across
     start = np.array([(foot - center) @ x, (foot - center) @ y])
     slope = np.array([line @ x, line @ y])
-    if isinstance(shape, Disk):
+    if isinstance(shape, Plane):
+        reach = FAR * np.array([-1.0, 1.0])
+    elif isinstance(shape, Disk):
         half = shape.radius**2 - start @ start + (start @ slope) ** 2
         if half <= 0:
             return None
         reach = -(start @ slope) + np.sqrt(half) * np.array([-1.0, 1.0])
-    else:
+    elif isinstance(shape, Rectangle):
         with np.errstate(divide="ignore", invalid="ignore"):
             ends = (np.array([[-0.5], [0.5]]) * np.array(shape.size) - start) / slope
         ends = np.where(np.isfinite(ends), np.sort(ends, axis=0), np.array([[-np.inf], [np.inf]]))
@@ -107,6 +115,14 @@ def along_face(shape: object, cut: Cut) -> Points | None:
         if beside.any() or reach[0] >= reach[1]:
             return None
     return cut.project(foot + reach[:, None] * line)
+
+
+def _frame_of(shape: object) -> Frame | None:
+    """The frame of an open face, its z axis towards the front."""
+    if isinstance(shape, Plane):
+        x, y, z = (shape.offset * c for c in shape.normal)
+        return any_frame((x, y, z), shape.normal)
+    return shape.frame if isinstance(shape, Rectangle | Disk) else None
 
 
 # --- flat faces -----------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.record import RayPath
 from harness.scene.containment import signed_distance
-from harness.scene.resolved import Disk, Rectangle, ResolvedScene, SurfaceShape, Vec3
+from harness.scene.resolved import Disk, Plane, Rectangle, ResolvedScene, SurfaceShape, Vec3
 from harness.section.outline import Points
 
 
@@ -60,6 +60,9 @@ def _normal_at(scene: ResolvedScene, point: Points, step: float) -> Points:
 
 def _near(shape: SurfaceShape, point: Points, step: float) -> tuple[float, Points]:
     """(distance, unit normal); the gradient of the distance is the normal of what is closed."""
+    if isinstance(shape, Plane):
+        normal = np.array(shape.normal)
+        return abs(float(normal @ point) - shape.offset), normal
     if isinstance(shape, Rectangle | Disk):
         local = point - np.array(shape.frame.origin)
         axes = shape.frame.x, shape.frame.y, shape.frame.z

@@ -121,6 +121,8 @@ def _scaled_shape(shape: rs.SurfaceShape, factor: float) -> rs.SurfaceShape:
                 "frame": _scaled_frame(shape.frame, factor),
                 "size": (width * factor, height * factor),
             }
+        case rs.Plane():
+            update = {"offset": shape.offset * factor}
         case rs.Disk():
             update = {
                 "frame": _scaled_frame(shape.frame, factor),

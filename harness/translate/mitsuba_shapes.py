@@ -46,7 +46,7 @@ def parts(shape: rs.SolidShape | rs.SurfaceShape) -> Iterator[tuple[str, Node]]:
             yield "", _mesh(shape.vertices, shape.triangles, normals=shape.normals)
         case rs.Cylinder():
             yield from _cylinder(shape)
-        case rs.Cone() | rs.Lens() | rs.Csg():
+        case rs.Cone() | rs.Lens() | rs.Csg() | rs.Plane():
             raise RendererUnsupported(f"Mitsuba has no {shape.type}")
         case rs.Rectangle():
             yield "", {"type": "rectangle", "to_world": _on_frame(shape.frame, *shape.size)}

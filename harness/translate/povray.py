@@ -245,7 +245,15 @@ class Writer:
         """POV-Ray takes a camera inside a shape to be in its medium, unless it is inverted."""
         origin = np.array([self.scene.camera.origin])
         match shape:  # faces and meshes without inside_vector have no inside
-            case rs.Sphere() | rs.Convex() | rs.Cylinder() | rs.Cone() | rs.Lens() | rs.Csg():
+            case (
+                rs.Sphere()
+                | rs.Convex()
+                | rs.Cylinder()
+                | rs.Cone()
+                | rs.Lens()
+                | rs.Csg()
+                | rs.Plane()
+            ):
                 if signed_distance(shape, origin)[0] < 0:
                     return shape_text(shape, texture, "hollow inverse")
         return shape_text(shape, texture, "hollow")
@@ -332,14 +340,23 @@ def _translucent(shape: rs.SurfaceShape, material: rs.Translucent) -> str:
     r, g, b = (number(c) for c in material.color)
     color = f"rgbft <{r}, {g}, {b}, {number(material.filter)}, {number(material.transmit)}>"
     texture = f"pigment {{ {color} }} finish {{ ambient 0 diffuse 1 }}"
-    if not isinstance(shape, rs.Rectangle | rs.Disk):
+    if not isinstance(shape, rs.Rectangle | rs.Disk | rs.Plane):
         return shape_text(shape, texture, "interior { ior 1 }", "hollow")
-    frame = shape.frame
-    behind = tuple(o - PAIR_GAP * z for o, z in zip(frame.origin, frame.z, strict=True))
-    back = shape.model_copy(update={"frame": frame.model_copy(update={"origin": behind})})
+    back = _back_of_pair(shape)
     clear = "pigment { rgbt 1 } finish { ambient 0 diffuse 0 }"
     faces = f"{shape_text(shape, texture)}\n{shape_text(back, clear)}"
-    return f"union {{\n{faces}\n  interior {{ ior 1 }}\n  hollow\n}}"
+    kind = "intersection" if isinstance(shape, rs.Plane) else "union"
+    return f"{kind} {{\n{faces}\n  interior {{ ior 1 }}\n  hollow\n}}"
+
+
+def _back_of_pair(face: rs.Rectangle | rs.Disk | rs.Plane) -> rs.SurfaceShape:
+    """The same face `PAIR_GAP` further back; of half-spaces the one with which it makes a sheet."""
+    if isinstance(face, rs.Plane):
+        x, y, z = face.normal
+        return rs.Plane(normal=(-x, -y, -z), offset=PAIR_GAP - face.offset)
+    frame = face.frame
+    behind = tuple(o - PAIR_GAP * z for o, z in zip(frame.origin, frame.z, strict=True))
+    return face.model_copy(update={"frame": frame.model_copy(update={"origin": behind})})
 
 
 def _camera(scene: rs.ResolvedScene) -> str:

@@ -27,6 +27,9 @@ FAR = 1e7
 REACH = 65536.0
 # And this far where solids reach into each other, by a few hit floors (see `povray_contact`).
 REACH_IN_CONTACT = 8 * REACH
+# And no further where a plane goes on for ever. POV-Ray's ends at `FAR`, 4e4 times as far as the
+# rest: the horizon is lower by some 1e-5 of the angle at which the scene is seen.
+REACH_WITH_PLANES = 256.0
 # Nothing may be thinner than this many hit floors.
 FLOORS = 1000
 
@@ -34,12 +37,15 @@ FLOORS = 1000
 def length_scale(scene: rs.ResolvedScene) -> float:
     """The power of two by which the translator multiplies lengths.
 
-    The scene is made to reach `REACH` units or less, or `REACH_IN_CONTACT` where solids meet;
-    larger, up to a tenth of `FAR`, only where a solid would be thinner than `FLOORS` hit floors.
+    The scene is made to reach `REACH` units or less, `REACH_IN_CONTACT` where solids meet, or
+    `REACH_WITH_PLANES` where it goes on for ever; larger, up to a tenth of `FAR`, only where a
+    solid would be thinner than `FLOORS` hit floors.
     Raises RendererUnsupported where no scale gives both.
     """
     reach = max(_extents(scene), default=1.0) or 1.0
     aim = REACH_IN_CONTACT if any(solid.meets for solid in scene.solids) else REACH
+    if any(isinstance(surface.shape, rs.Plane) for surface in scene.surfaces):
+        aim = REACH_WITH_PLANES
     factor = 2.0 ** math.floor(math.log2(aim / reach))
     thinnest = min((thickness(solid.shape) for solid in scene.solids), default=math.inf)
     if thinnest * factor < FLOORS * HIT_FLOOR:
@@ -79,6 +85,8 @@ def _extent(shape: rs.SurfaceShape) -> float:
             return float(np.abs(shape.frame.origin).max()) + shape.radius + shape.height / 2
         case rs.Cone() | rs.Lens() | rs.Csg():
             return float(np.abs(bounds(shape)).max())
+        case rs.Plane():
+            return abs(shape.offset)
         case rs.Rectangle():
             return float(np.abs(shape.frame.origin).max()) + math.hypot(*shape.size) / 2
         case rs.Disk():

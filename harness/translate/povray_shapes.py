@@ -30,6 +30,8 @@ def shape_text(shape: rs.SurfaceShape, *modifiers: str, solid: bool = False) -> 
             # Planes are double precision; the vertices of a mesh2 would be single.
             planes = (f"  plane {{ {vector(p[:3])}, {number(p[3])} }}" for p in shape.planes)
             head = "\n".join(("intersection {", *planes))
+        case rs.Plane():
+            head = f"plane {{ {vector(shape.normal)}, {number(shape.offset)}"
         case rs.Cone():
             base, axis = np.array(shape.frame.origin), np.array(shape.frame.z)
             ends = f"{vector(base)}, {number(shape.radius)}"

@@ -85,6 +85,14 @@ def _solid_shape(shape: resolved.SolidShape) -> tracer.scene.SolidShape:
     return _analytic(shape)
 
 
+def _part(shape: resolved.Part) -> tracer.solids.Part:
+    return _plane(shape) if isinstance(shape, resolved.Plane) else _analytic(shape)
+
+
+def _plane(shape: resolved.Plane) -> tracer.shapes.Plane:
+    return tracer.shapes.Plane(shape.normal, shape.offset)
+
+
 def _analytic(shape: resolved.Analytic) -> tracer.solids.Analytic:
     match shape:
         case resolved.Sphere():
@@ -114,7 +122,7 @@ def _analytic(shape: resolved.Analytic) -> tracer.solids.Analytic:
 
 
 def _composed(shape: resolved.Csg) -> tracer.solids.Compound:
-    first, *others = map(_analytic, shape.parts)
+    first, *others = map(_part, shape.parts)
     match shape.operation:
         case "union":
             return tracer.solids.union(first, *others)
@@ -130,6 +138,8 @@ def _shape(shape: resolved.SurfaceShape) -> tracer.scene.Shape:
             return tracer.shapes.Rectangle(f.origin, f.x, f.y, f.z, shape.size)
         case resolved.Disk(frame=f):
             return tracer.shapes.Disk(f.origin, f.x, f.y, f.z, shape.radius)
+        case resolved.Plane():
+            return _plane(shape)
         case _:
             return _solid_shape(shape)
 

@@ -110,21 +110,3 @@ def test_thin_slab_offset() -> None:
     assert d == pytest.approx(0.05818453388702909, rel=8 * EPS)
     assert optics.thin_slab_offset(math.radians(10), 1.0, 1.0) == (True, 0.0)
     assert optics.thin_slab_offset(math.radians(60), 1.0, 0.5) == (False, 0.0)
-
-
-@settings(deadline=None)  # the first call compiles
-@given(unit_angles, st.floats(0.01, 10), st.floats(1.001, 4.0))
-def test_crossing_a_slab_shifts_by_the_closed_form(
-    theta: float, thickness: float, ior: float
-) -> None:
-    wi = (math.sin(theta), 0.0, math.cos(theta))
-    transmits, way, length = optics.cross_slab(wi, (0.0, 0.0, 1.0), thickness, 1.0, ior)
-    assert transmits
-    assert way[2] == pytest.approx(-thickness, rel=8 * EPS)
-    assert math.sqrt(dot(way, way)) == pytest.approx(length, rel=8 * EPS)
-    # Distance of the exit point from the straight line through the origin along -wi.
-    off = cross(way, wi)
-    _, d = optics.thin_slab_offset(theta, thickness, ior)
-    assert math.copysign(math.sqrt(dot(off, off)), -off[1]) == pytest.approx(
-        d, abs=16 * EPS * length
-    )
