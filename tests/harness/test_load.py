@@ -142,8 +142,8 @@ def test_case_names_are_fit_for_files() -> None:
 # --- what does not --------------------------------------------------------------------------------
 
 SHAPES = (
-    "box, cone, cylinder, difference, icosphere, intersection, lens, mesh, polygons, prism, slab, "
-    "sphere, triangles, union or wedge"
+    "box, cone, cylinder, difference, icosphere, intersection, lens, mesh, plane, polygons, prism, "
+    "slab, sphere, triangles, union or wedge"
 )
 EDITS = {
     # name: (old, new, line, key, message, value, expected, suggestion); None matches anything
