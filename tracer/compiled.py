@@ -55,7 +55,12 @@ def called(function: Function) -> Function:
     return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-def _compiled(function: Function, **options: bool) -> Function:
+def merged(function: Function) -> Function:
+    """As `inlined`, for what one function alone calls: merged first, and compiled once."""
+    return _compiled(function, inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+def _compiled(function: Function, **options: Any) -> Function:
     options |= {"cache": True, "nogil": True, "_nrt": False}
     dispatcher = _numba.njit(error_model="numpy", **options)(function)
     if hasattr(dispatcher, "py_func"):

@@ -20,7 +20,7 @@ from tracer.arrays import (
     Arrays,
     Floats,
 )
-from tracer.compiled import inlined
+from tracer.compiled import inlined, merged
 from tracer.faces import face_distance, open_face
 from tracer.mesh import smooth_normal, triangle_normal
 from tracer.shapes import (
@@ -123,7 +123,7 @@ def _rounding(scene: Arrays, solid: int) -> float:
     return OF_PLACES * float(np.sqrt(dot(center, center)) + np.sqrt(scene.balls[solid, 3]))
 
 
-@inlined
+@merged
 def _next_hit(
     scene: Arrays,
     o: Vec,
@@ -237,7 +237,7 @@ def _mesh_hit(
     return (t if face >= 0 else INF), face, side > 0
 
 
-@inlined
+@merged
 def mesh_hits_ahead(
     scene: Arrays, origins: Floats, directions: Floats, found: Floats, lanes: Lanes
 ) -> None:

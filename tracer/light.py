@@ -13,7 +13,7 @@ from tracer.arrays import (
     Arrays,
     Floats,
 )
-from tracer.compiled import called, inlined
+from tracer.compiled import called, inlined, merged
 from tracer.hit import hit_point, nearest_hit
 from tracer.optics import reflect
 from tracer.patterns import CONSTANT, panorama_radiance
@@ -34,7 +34,7 @@ def absorbed(media: Floats, medium: int, length: float) -> Vec:
     )
 
 
-@called
+@merged
 def unshadowed(
     scene: Arrays,
     o: Vec,

@@ -24,7 +24,7 @@ from tracer.arrays import (
     flatten,
     ranked,
 )
-from tracer.compiled import compiled, inlined
+from tracer.compiled import compiled, inlined, merged
 from tracer.errors import SceneError
 from tracer.hit import NOTHING, UNKNOWN, hit_point, mesh_hits_ahead, nearest_hit_knowing, new_stack
 from tracer.optics import reflect
@@ -109,7 +109,7 @@ def _put(table: Floats, row: int, v: Vec) -> None:
     table[row, 0], table[row, 1], table[row, 2] = v[0], v[1], v[2]
 
 
-@inlined
+@merged
 def _take(
     scene: Arrays,
     hit: int,
@@ -157,7 +157,7 @@ def _take(
     return Beyond(GOING if going else MISS, p, d, 1.0, 0.0, dot(wi, n), np.nan, np.nan)
 
 
-@inlined
+@merged
 def _follow_one(
     scene: Arrays,
     o: Vec,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracer.arrays import DIELECTRIC, EMISSIVE, MATERIAL, MEDIUM, NORMALS, Arrays, Floats
-from tracer.compiled import called, inlined
+from tracer.compiled import called, inlined, merged
 from tracer.hit import NOTHING, Hit, hit_point, new_stack
 from tracer.light import absorbed, surroundings
 from tracer.shapes import INF
@@ -102,7 +102,7 @@ def exposure(
     return Exposure(limits, lobes, share, samples, waiting, scratch)
 
 
-@called
+@merged
 def go_on(scene: Arrays, exposure: Exposure, height: int) -> int:
     """Adds what the rays of a wave see to their samples, and lays the rays aside that go on.
 
@@ -278,7 +278,7 @@ def _lay_aside(exposure: Exposure, first: int, second: int, at: int, ray: Ray) -
 # --- other surfaces -------------------------------------------------------------------------------
 
 
-@called
+@merged
 def _scatter(
     scene: Arrays, exposure: Exposure, wave: Wave, count: int, first: int, second: int, at: int
 ) -> int:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import called, inlined
+from tracer.compiled import inlined, merged
 from tracer.errors import SceneError
 from tracer.vector import Vec, along, dot, normalise, scale, sub
 
@@ -161,7 +161,7 @@ def plane_stretch(o: Vec, d: Vec, normal: Vec, offset: float) -> tuple[float, fl
     return t if approach < 0.0 else -INF, t if approach > 0.0 else INF
 
 
-@called
+@merged
 def quadric_stretch(o: Vec, d: Vec, rows: Rows, row: int, on_it: bool) -> tuple[float, float]:
     """`on_it` says that `o` lies on the surface and `d` points inwards: one root is t = 0."""
     axis = vec_at(rows, row, 5)
@@ -234,7 +234,7 @@ def cell_stretch(
     return enter, row_in, leave, row_out
 
 
-@called
+@merged
 def compound_hit(
     o: Vec,
     d: Vec,

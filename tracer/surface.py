@@ -18,7 +18,7 @@ from tracer.arrays import (
     Arrays,
     Floats,
 )
-from tracer.compiled import called, inlined
+from tracer.compiled import called, inlined, merged
 from tracer.hit import hit_point
 from tracer.light import absorbed, lit
 from tracer.optics import (
@@ -126,7 +126,7 @@ def emitted(scene: Arrays, hit: int, p: Vec) -> Vec:
     return pattern_radiance(scene.patterns, scene.objects[hit, PATTERN], scene.texels, u, v)
 
 
-@inlined
+@merged
 def scatter(
     scene: Arrays,
     lobes: Lobes,

@@ -22,7 +22,7 @@ from tracer.boxes import (
     WIDTH,
     Bytes,
 )
-from tracer.compiled import called, compiled, inlined
+from tracer.compiled import compiled, inlined, merged
 from tracer.shapes import vec_at
 from tracer.vector import Vec
 
@@ -173,7 +173,7 @@ def _halve(halves: Halves, order: Ints32, tasks: Ints, bins: Singles) -> None:
         last, level = tasks[waiting, 2], tasks[waiting, 3]
 
 
-@called
+@merged
 def _split(boxes: Singles, order: Ints32, first: int, last: int, bins: Singles, halve: bool) -> int:
     """Sorts a range into two parts of least surface area cost; where the second begins.
 
@@ -222,7 +222,7 @@ def _bin(boxes: Singles, i: int, axis: int, low: float, to_bin: float) -> int:
     return int((boxes[i, axis] + boxes[i, 3 + axis] - low) * to_bin)
 
 
-@inlined
+@merged
 def _cheapest(bins: Singles, count: int) -> int:
     """The bin before which to split. Columns of `bins`: box, number of triangles, cost."""
     best, lowest = 1, INF
@@ -356,7 +356,7 @@ def _fold(
     return count
 
 
-@called
+@merged
 def _pack(boxes: Singles, count: int, nodes: Views, node: int) -> None:
     """Writes the boxes of `count` children into a node; the others get boxes inside out."""
     for child in range(count, WIDTH):

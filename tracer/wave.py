@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracer.arrays import AMBIENT, DISK, FIRST, RECTANGLE, SHAPE, SPHERE, Arrays, Floats
-from tracer.compiled import called, inlined
+from tracer.compiled import called, inlined, merged
 from tracer.faces import face_distance, open_face
 from tracer.hit import (
     NOTHING,
@@ -151,7 +151,7 @@ def _rank(wave: Wave, i: int, k: int, t: float, entering: bool) -> None:
     ints[BEFORE + i], ints[BEYOND + i] = before, beyond
 
 
-@called
+@merged
 def nearest_hits(scene: Arrays, wave: Wave, n: int, fresh: bool, scratch: Scratch) -> None:
     """What the first `n` rays meet (see `tracer.hit.nearest_hit`), BEFORE and BEYOND what media.
 
