@@ -130,10 +130,12 @@ def preflight(
     if noisy:
         # Codes are sampled at pixel centres even where pictures are not: the constant channel of
         # a bare plane tells how exact a radiance is.
-        level = np.concatenate([codes[axis].pixels[..., 2].ravel() for axis in AXES])
-        quantum = max(1.01 * float(np.abs(level - AMPLITUDE).max()), FLOAT32)
+        error = np.max([np.abs(codes[axis].pixels[..., 2] - AMPLITUDE) for axis in AXES], axis=0)
+        quantum = max(1.01 * float(error.max()), FLOAT32)
+    else:
+        error = _chart_error(images)
     if not quantum <= COARSEST:
-        return Preflight(quantum, cells, np.nan, epsilon, samples, (_too_coarse(quantum),))
+        return Preflight(quantum, cells, np.nan, epsilon, samples, (_too_coarse(error),))
     position_error, findings = _positions(codes, cells, quantum, epsilon)
     return Preflight(quantum, cells, position_error, epsilon, samples, findings)
 
@@ -146,13 +148,18 @@ def _quantum(images: Mapping[str, Image]) -> float:
     of sRGB grow with the value, and the chart's brightest pixels are few: a picture whose values
     are such steps has half of the last one, whatever the chart showed.
     """
-    worst = max(
-        float(np.abs(images[axis].pixels.astype(np.float64) - true_ramp(axis)).max())
-        for axis in AXES
-    )
     steps = _srgb_steps(images)
     last = 0.5 / steps * SRGB_STEEPEST if steps else 0.0
-    return max(1.01 * worst, FLOAT32, last)
+    return max(1.01 * float(_chart_error(images).max()), FLOAT32, last)
+
+
+def _chart_error(images: Mapping[str, Image]) -> Float:
+    """(H, W) how far the pixels of the chart are off, in the worse image and the worst channel."""
+    errors = [
+        np.abs(images[axis].pixels.astype(np.float64) - true_ramp(axis)).max(axis=-1)
+        for axis in AXES
+    ]
+    return np.asarray(np.max(errors, axis=0))
 
 
 def _srgb_steps(images: Mapping[str, Image]) -> int | None:
@@ -165,8 +172,13 @@ def _srgb_steps(images: Mapping[str, Image]) -> int | None:
     return None
 
 
-def _too_coarse(quantum: float) -> str:
-    return f"radiance is off by up to {quantum:.3g} somewhere on the chart: coarser than 8 bits"
+def _too_coarse(error: Float) -> str:
+    """Says how many pixels are off by more than 8 bits excuse: all over, or in a few places."""
+    y, x = np.unravel_index(int(np.nan_to_num(error, nan=np.inf).argmax()), error.shape)
+    return (
+        f"radiance is off in {int((~(error <= COARSEST / 1.01)).sum())} of {error.size} pixels of "
+        f"the chart by more than 8 bits excuse: by {error[y, x]:.3g} at ({x}, {y})"
+    )
 
 
 def _positions(
