@@ -10,6 +10,7 @@ from harness.diagnosis.edges import nearness
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, says
 from harness.diagnosis.worlds import World
 from harness.expected import Float
+from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Mesh, Vec3
 from harness.truth.law import Mask
 from harness.truth.paths import TruePaths
@@ -61,12 +62,18 @@ def mirrored_mesh(axis: int) -> Hypothesis:
             }
         )
 
+    def past(_: Rays, paths: TruePaths) -> TruePaths:
+        """Rays that the mesh is not in the way of any more go straight on."""
+        missed = (paths.status == Status.MISS) & np.isnan(paths.interface).all(axis=(1, 2))
+        return replace(paths, status=np.where(missed, Status.HIT, paths.status).astype(np.int8))
+
     def world(world: World, _: Values) -> World:
         solids = [
             s.model_copy(update={"shape": turned(s.shape)}) if isinstance(s.shape, Mesh) else s
             for s in world.scene.solids
         ]
-        return replace(world, scene=world.scene.model_copy(update={"solids": tuple(solids)}))
+        scene = world.scene.model_copy(update={"solids": tuple(solids)})
+        return replace(world, scene=scene, finish=past)
 
     return Hypothesis(
         f"mesh-mirrored-{'xyz'[axis]}", world,
