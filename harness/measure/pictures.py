@@ -35,7 +35,7 @@ GRAZING = 1e-3
 # compared next to that of pixels, one must graze no edge: then no fault of that size can hide
 # behind edges. They are found on the helper's pictures alone, so this judges the scene, and no
 # renderer can hide by being wrong. The largest square of the catalogue, at a ball's rim, has 2
-# (decision 0021).
+# (decision 0022).
 SQUARE = REGIONS[1]
 SSIM_FLOOR = 1e-4
 

@@ -98,8 +98,8 @@ class Lane:
         self, renderer: Renderer, settings: RenderSettings, surroundings: Surroundings
     ) -> None:
         self.renderer, self.settings, self.around = renderer, settings, surroundings
-        count = getattr(renderer, "concurrency", 1)
-        self.executor = surroundings.make_executor(count, surroundings.running)
+        self.concurrency: int = getattr(renderer, "concurrency", 1)
+        self.executor = surroundings.make_executor(self.concurrency, surroundings.running)
         self._memo = Memo(renderer.name, "", None, lasting=False)
 
     def start(self) -> None:
