@@ -13,7 +13,7 @@ from harness.probe.chart import chart, srgb_decode, srgb_encode
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer
-from tests.fakes.student import CAPABILITIES, student
+from tests.fakes.student import CAPABILITIES, averaging, student
 
 WIDTH, HEIGHT = chart().film.width, chart().film.height
 ASPECT = HEIGHT / WIDTH
@@ -61,8 +61,10 @@ def stored_as_srgb(pixels: Float) -> Float:
         (stored_in(16), 0.99 * 0.5 / 65535, 1.01 * (0.5 / 65535 + FLOAT32)),
         # sRGB is steepest at the top: 2.4 / 1.055 times half a step.
         (stored_as_srgb, 0.9 / 255, 1.01 * (0.5 / 255 * 2.4 / 1.055 + FLOAT32)),
+        # Half a step of the binade below 1, whether or not the chart's brightest pixels met it.
+        (lambda p: p.astype(np.float16).astype(float), 2.0**-12, 1.01 * 2.0**-12),
     ],
-    ids=["8 bit", "16 bit", "8 bit sRGB"],
+    ids=["8 bit", "16 bit", "8 bit sRGB", "half floats"],
 )
 def test_coarse_images_pass_with_coarse_figures(
     shows: Callable[[Float], Float], least: float, most: float
@@ -292,3 +294,26 @@ def test_the_format_of_values_is_named(pixels: Callable[[Float], Float], said: s
     """By the largest error of values between 0.1 and 1, as on the chart."""
     true = np.linspace(0.1, 1.0, 36001)
     assert stored_as(1.01 * float(np.abs(pixels(true) - true).max())) == said
+
+
+# --- means over pixels ----------------------------------------------------------------------------
+
+
+def test_anti_aliasing_is_named_where_pixel_centres_are_claimed() -> None:
+    found = findings(averaging())
+    assert "pixels show means over their areas" in found
+    assert "do not claim pixel-centres" in found
+
+
+def test_who_does_not_claim_pixel_centres_may_average() -> None:
+    found = calibrated(averaging(capabilities=CAPABILITIES - {Capability.PIXEL_CENTRES}))
+    assert found.findings == ()
+    assert found.averages
+    assert found.cells == 1
+    assert found.facts()["pixels"] == "means over their areas"
+
+
+def test_means_over_half_of_a_pixel_are_still_shifted() -> None:
+    """Not what averaging can do: the mean of a pixel lies in its middle."""
+    aside = averaging(sees=moved(0.3, 0), capabilities=CAPABILITIES - {Capability.PIXEL_CENTRES})
+    assert "shifted by" in findings(aside)
