@@ -14,7 +14,7 @@ import numpy as np
 
 from harness import __version__, plan, record
 from harness.documents import PARTIAL
-from harness.errors import RendererError, RendererFailed
+from harness.errors import RendererError, RendererFailed, utf8
 from harness.judging.judge import Judgement
 from harness.judging.results import Contender, Results
 from harness.measure.images import Pixels
@@ -270,7 +270,7 @@ def _from_here(file: Path) -> str:
     """The path from the working folder where it is below that; with forward slashes."""
     path = file.absolute()
     here = Path.cwd()
-    return (path.relative_to(here) if path.is_relative_to(here) else path).as_posix()
+    return utf8((path.relative_to(here) if path.is_relative_to(here) else path).as_posix())
 
 
 def _cut(result: object) -> float | None:

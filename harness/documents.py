@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from harness.errors import InputError
+from harness.errors import InputError, printable
 
 Document = TypeVar("Document", bound=BaseModel)
 
@@ -69,12 +69,7 @@ def parse(data: bytes, kind: type[Document], path: Path, what: str = "record") -
         position = re.search(r"at line (\d+) column \d+", first["msg"])
         line = None if key else 1  # what is wrong with all of it is wrong from the beginning
         raise InputError.of(
-            f"not a valid {what}: {escaped(first['msg'])[:LONGEST_MESSAGE]}",
-            file=path, key=escaped(key)[:LONGEST_KEY],
+            f"not a valid {what}: {printable(first['msg'])[:LONGEST_MESSAGE]}",
+            file=path, key=printable(key)[:LONGEST_KEY],
             line=int(position[1]) if position else line,
         ) from error  # fmt: skip
-
-
-def escaped(text: str) -> str:
-    """The text with whatever could act on a terminal or break a line escaped."""
-    return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)

@@ -20,6 +20,11 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in text)
 
 
+def utf8(text: str) -> str:
+    """The text as a document can hold it; names of files may be of bytes that are no text."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+
+
 def shown(text: str) -> str:
     """The text as a message shows it; names in it may be of any length."""
     text = printable(text)

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import re
 import struct
-import tempfile
 import threading
 import zlib
 from collections.abc import Callable, Iterator
@@ -24,6 +22,7 @@ from typing import Any, BinaryIO, Literal, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.documents import write_bytes
 from harness.errors import InputError
 
 Encoding = Literal["linear", "srgb"]
@@ -162,18 +161,23 @@ def _linear(stored: NDArray[Any], encoding: Encoding) -> Pixels:
 def _read_exr(wanted: _Wanted) -> _Stored:
     import OpenEXR
 
-    path = str(wanted.path)
     # OpenEXR prints to sys.stdout what it also shows as a missing part. The lock keeps two
-    # threads from restoring each other's redirection.
-    with _OPENEXR, contextlib.redirect_stdout(io.StringIO()):
-        header = OpenEXR.File(path, header_only=True).header()
+    # threads from restoring each other's redirection. It takes names of files to be UTF-8, which
+    # they need not be, so it is given the open file.
+    with (
+        _OPENEXR,
+        contextlib.redirect_stdout(io.StringIO()),
+        wanted.path.open("rb") as stream,
+    ):
+        header = OpenEXR.File(stream, header_only=True).header()
         (left, top), (right, bottom) = (
             (int(x), int(y)) for x, y in header.get("dataWindow", ((0, 0), (-1, -1)))
         )
         wanted.check_size(right - left + 1, bottom - top + 1)
         if len(header["channels"]) > MAX_CHANNELS:
             wanted.refuse("too many channels", value=str(len(header["channels"])))
-        file = OpenEXR.File(path, separate_channels=True)
+        stream.seek(0)
+        file = OpenEXR.File(stream, separate_channels=True)
     if not file.parts:
         wanted.refuse("the image is truncated or damaged")
     if any(map(any, np.subtract(header["dataWindow"], header["displayWindow"]))):
@@ -327,37 +331,23 @@ FORMATS = tuple(_MAGIC)
 # --- writers: all or nothing ----------------------------------------------------------------------
 
 
-@contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path`, renamed to it at the end, removed at an error."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
 def write_exr(path: Path, pixels: Pixels) -> None:
     """Writes `pixels` (H, W, 3) as 32-bit linear RGB, losslessly compressed."""
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     rgb = np.ascontiguousarray(_checked(pixels), dtype=np.float32)
-    with _replacing(path) as temporary:
-        OpenEXR.File(header, {"RGB": rgb}).write(str(temporary))
+    stream = io.BytesIO()
+    OpenEXR.File(header, {"RGB": rgb}).write(stream)
+    write_bytes(path, stream.getvalue())
 
 
 def write_npy(path: Path, pixels: Pixels) -> None:
     """Writes `pixels` (H, W, 3) as float32."""
     values = np.ascontiguousarray(_checked(pixels), dtype="<f4")
-    with _replacing(path) as temporary, temporary.open("wb") as file:
-        np.save(file, values, allow_pickle=False)
+    stream = io.BytesIO()
+    np.save(stream, values, allow_pickle=False)
+    write_bytes(path, stream.getvalue())
 
 
 def write_png(
@@ -373,8 +363,7 @@ def write_png(
     name, content = (b"sRGB", b"\0") if encoding == "srgb" else (b"gAMA", struct.pack(">I", 100000))
     chunk = struct.pack(">I", len(content)) + name + content
     chunk += struct.pack(">I", zlib.crc32(name + content))
-    with _replacing(path) as temporary:
-        temporary.write_bytes(data[:33] + chunk + data[33:])  # after the signature and IHDR
+    write_bytes(path, b"".join([data[:33], chunk, data[33:]]))  # after the signature and IHDR
 
 
 def _checked(pixels: Pixels) -> Pixels:

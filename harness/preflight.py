@@ -52,7 +52,8 @@ class Preflight:
     `quantum` bounds the error of a radiance value, `cells` is the finest usable position code,
     `position_error` the largest error of a decoded position relative to the plane's size,
     `epsilon` the relative precision of the arithmetic. `samples` per pixel choose lobes at random,
-    where the renderer does that (then it is `noisy`). `findings` is empty where all is well.
+    where the renderer does that (then it is `noisy`). With `averages`, position codes come as means
+    over pixels, so that only coarse ones can be read. `findings` is empty where all is well.
     """
 
     quantum: float
@@ -61,6 +62,7 @@ class Preflight:
     epsilon: float
     samples: int | None
     findings: tuple[str, ...] = ()
+    averages: bool = False
 
     @property
     def noisy(self) -> bool:
@@ -85,6 +87,7 @@ class Preflight:
             "epsilon": self.epsilon,
             "values": stored_as(self.quantum),
             "noise": f"{self.samples} samples per pixel" if self.samples is not None else "none",
+            **({"pixels": "means over their areas"} if self.averages else {}),
         }
 
 
@@ -130,12 +133,21 @@ def preflight(
     if noisy:
         # Codes are sampled at pixel centres even where pictures are not: the constant channel of
         # a bare plane tells how exact a radiance is.
-        level = np.concatenate([codes[axis].pixels[..., 2].ravel() for axis in AXES])
-        quantum = max(1.01 * float(np.abs(level - AMPLITUDE).max()), FLOAT32)
+        error = np.max([np.abs(codes[axis].pixels[..., 2] - AMPLITUDE) for axis in AXES], axis=0)
+        quantum = max(1.01 * float(error.max()), FLOAT32)
+    else:
+        error = _chart_error(images)
     if not quantum <= COARSEST:
-        return Preflight(quantum, cells, np.nan, epsilon, samples, (_too_coarse(quantum),))
+        return Preflight(quantum, cells, np.nan, epsilon, samples, (_too_coarse(error),))
     position_error, findings = _positions(codes, cells, quantum, epsilon)
-    return Preflight(quantum, cells, position_error, epsilon, samples, findings)
+    if not np.isnan(position_error):  # all codes could be read
+        return Preflight(quantum, cells, position_error, epsilon, samples, findings)
+    coarse = {axis: render(code_scene(chart(), plane(), axis, 1, ""), settings) for axis in AXES}
+    averaged = _averaged(coarse, quantum, epsilon)
+    if averaged is None:
+        return Preflight(quantum, cells, position_error, epsilon, samples, findings)
+    findings = () if noisy else (AVERAGED,)
+    return Preflight(quantum, 1, averaged, epsilon, samples, findings, averages=True)
 
 
 def _quantum(images: Mapping[str, Image]) -> float:
@@ -143,16 +155,31 @@ def _quantum(images: Mapping[str, Image]) -> float:
 
     The largest of N errors spread evenly up to a bound falls short of it by 1/N of it; 1% covers
     that for the chart's 36,864 values. A renderer of floats has at least their rounding. The steps
-    of sRGB grow with the value, and the chart's brightest pixels are few: a picture whose values
-    are such steps has half of the last one, whatever the chart showed.
+    of sRGB and of half floats grow with the value, and the chart's brightest pixels are few: a
+    picture whose values are such steps has half of the last one, whatever the chart showed.
     """
-    worst = max(
-        float(np.abs(images[axis].pixels.astype(np.float64) - true_ramp(axis)).max())
-        for axis in AXES
-    )
     steps = _srgb_steps(images)
     last = 0.5 / steps * SRGB_STEEPEST if steps else 0.0
-    return max(1.01 * worst, FLOAT32, last)
+    if _half_floats(images):
+        last = FORMATS["half floats"]
+    return max(1.01 * float(_chart_error(images).max()), FLOAT32, last)
+
+
+def _half_floats(images: Mapping[str, Image]) -> bool:
+    """Whether all values are such as half floats hold."""
+    return all(
+        bool(np.all(image.pixels.astype(np.float16).astype(np.float32) == image.pixels))
+        for image in images.values()
+    )
+
+
+def _chart_error(images: Mapping[str, Image]) -> Float:
+    """(H, W) how far the pixels of the chart are off, in the worse image and the worst channel."""
+    errors = [
+        np.abs(images[axis].pixels.astype(np.float64) - true_ramp(axis)).max(axis=-1)
+        for axis in AXES
+    ]
+    return np.asarray(np.max(errors, axis=0))
 
 
 def _srgb_steps(images: Mapping[str, Image]) -> int | None:
@@ -165,8 +192,13 @@ def _srgb_steps(images: Mapping[str, Image]) -> int | None:
     return None
 
 
-def _too_coarse(quantum: float) -> str:
-    return f"radiance is off by up to {quantum:.3g} somewhere on the chart: coarser than 8 bits"
+def _too_coarse(error: Float) -> str:
+    """Says how many pixels are off by more than 8 bits excuse: all over, or in a few places."""
+    y, x = np.unravel_index(int(np.nan_to_num(error, nan=np.inf).argmax()), error.shape)
+    return (
+        f"radiance is off in {int((~(error <= COARSEST / 1.01)).sum())} of {error.size} pixels of "
+        f"the chart by more than 8 bits excuse: by {error[y, x]:.3g} at ({x}, {y})"
+    )
 
 
 def _positions(
@@ -189,6 +221,29 @@ def _positions(
     if stray > max(16 * epsilon, 1e-3 / chart().film.width):
         return largest, (_displaced(errors),)
     return largest, ()
+
+
+AVERAGED = (
+    "pixels show means over their areas, as anti-aliasing makes them: send one ray through the "
+    "centre of each, or do not claim pixel-centres"
+)
+
+
+def _averaged(codes: Mapping[str, Image], quantum: float, epsilon: float) -> float | None:
+    """The largest error of codes of one cell where all of them are off by less than half a pixel.
+
+    Such are means over pixels of a code that is linear; with more cells the means of the fine part
+    say nothing. None where it is something else that is wrong with them.
+    """
+    largest = 0.0
+    for axis, true in true_coordinates().items():
+        decoded = decode(codes[axis].pixels, 1, AMPLITUDE, quantum + 2 * epsilon)
+        error = np.abs(decoded.coordinate - true.ravel())
+        slope_x, slope_y, _ = affine(true, np.ones_like(true, bool))
+        if not (error <= (abs(slope_x) + abs(slope_y)) / 2 + decoded.uncertainty).all():
+            return None
+        largest = max(largest, float(error.max()))
+    return largest
 
 
 def _displaced(errors: Mapping[str, Float]) -> str:

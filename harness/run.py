@@ -13,7 +13,7 @@ from harness.archive import Archive
 from harness.baseline.stand_in import StandIns
 from harness.cache.cache import Cache
 from harness.cache.stores import FolderStore
-from harness.errors import InputError
+from harness.errors import InputError, utf8
 from harness.judging.explain import explain_run
 from harness.judging.results import Contender
 from harness.plan import PreparedCase
@@ -147,7 +147,7 @@ def _summary(
         started=session.started,
         wall_s=time.perf_counter() - session.began,
         quality=session.quality,
-        command=command,
+        command=utf8(command),
         exit_code=EXIT_INTERRUPTED if interrupted else exit_code(cases, contenders),
         renderers={name: _renderer_summary(session, name) for name in session.names},
         counts=Counts.model_validate({v.value: verdicts.count(v) for v in Verdict}),

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import io
+import os
 import struct
+import sys
 import tempfile
 import zlib
 from pathlib import Path
@@ -321,6 +323,15 @@ def test_overflow_to_float32_is_counted(tmp_path: Path) -> None:
     assert info.nonfinite == 1
     assert np.isinf(back[0, 0, 0])
     assert info.bits == 64
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are text there")
+def test_an_exr_may_lie_at_a_name_that_is_no_text(tmp_path: Path) -> None:
+    path = tmp_path / os.fsdecode(b"caf\xe9.exr")
+    imagefile.write_exr(path, pixels(4, 3))
+    back, _ = imagefile.read(path)
+    assert np.array_equal(back, pixels(4, 3))
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_damaged_exr_prints_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

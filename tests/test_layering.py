@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 # Each layer may import itself and the layers above it in this list, none below. A dotted name is a
 # module that says what a later stage looks like from outside: names and protocols, no work.
 LAYERS = (
-    ("errors", "data", "cores", "fingerprint", "documents", "outcomes", "temporary"),
+    ("errors", "git", "data", "cores", "fingerprint", "documents", "outcomes", "temporary"),
     ("record", "imagefile", "expected", "expected_systems", "measure.observables"),
     ("cache",),
     ("scene",),

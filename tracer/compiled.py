@@ -30,7 +30,7 @@ _STAMP = _package_stamp()
 
 
 def compiled(function: Function) -> Function:
-    """Compiles `function` on its first call, and keeps the result on disk.
+    """Compiles `function` on its first call, and keeps the result on disk, where there is a place.
 
     IEEE arithmetic as written (no fast-math, no fused multiply-add): the same bits everywhere.
     The interpreter lock is released, so threads run side by side. Arrays are only borrowed: there
@@ -61,10 +61,14 @@ def merged(function: Function) -> Function:
 
 
 def _compiled(function: Function, **options: Any) -> Function:
-    options |= {"cache": True, "nogil": True, "_nrt": False}
-    dispatcher = _numba.njit(error_model="numpy", **options)(function)
+    options |= {"nogil": True, "_nrt": False}
+    try:
+        dispatcher = _numba.njit(error_model="numpy", cache=True, **options)(function)
+    except RuntimeError:  # neither beside the package nor at home may anything be written
+        dispatcher = _numba.njit(error_model="numpy", **options)(function)
     if hasattr(dispatcher, "py_func"):
-        dispatcher._cache._cache_file._source_stamp = _STAMP
+        if hasattr(dispatcher._cache, "_cache_file"):
+            dispatcher._cache._cache_file._source_stamp = _STAMP
         specialise = dispatcher.compile
 
         def compile_once(signature: Any) -> Any:

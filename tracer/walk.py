@@ -21,10 +21,10 @@ from tracer.boxes import (
     sight,
 )
 from tracer.compiled import called, inlined
-from tracer.mesh import triangle_distance
+from tracer.mesh import middle, rises, triangle_distance
 from tracer.shapes import vec_at
 from tracer.tree import HIGHEST, LEAF
-from tracer.vector import Vec
+from tracer.vector import Vec, along, sub
 
 Floats = NDArray[np.float64]
 Singles = NDArray[Any]  # in single precision
@@ -33,6 +33,10 @@ INF = np.inf
 BOTTOM = WIDTH  # below in the stack are the keys of the boxes that are looked at
 STACK = (BOTTOM + HIGHEST) // 2  # rows of two numbers, each as long as a key
 LANES = 12
+ROUNDING = 1e-15  # of a ray's origin, from where it has left a triangle
+# Triangles that are nearer to each other than this part of their distance are met in one place: at
+# their edge a ray that grazes meets them so much apart. Nothing in a scene is that small.
+TIE = 1e-10
 
 
 class Query(NamedTuple):
@@ -41,7 +45,7 @@ class Query(NamedTuple):
     o: Vec
     d: Vec
     sight: Sight
-    t_min: float
+    slack: float  # how far rounding may have put the ray from where it has left a triangle
     on_face: int
     side: int
 
@@ -70,14 +74,34 @@ def _step(
     leaf = -1 - node
     for triangle in range(leaf >> 3, (leaf >> 3) + (leaf & 7)):
         if triangle != query.on_face:
+            t_max = found.t if query.on_face >= 0 else found.t * (1.0 + TIE)
             t, side = triangle_distance(
-                query.o, query.d, triangles, triangle, query.side, query.t_min, found.t
+                query.o, query.d, triangles, triangle, query.side, query.slack, t_max
             )
-            if side != 0:
+            if side != 0 and _counts(query, triangles, found, t, triangle, side):
                 found = Found(t, triangle, side)
     while height > BOTTOM and keys[height - 1] > limit_of(found.t):
         height -= 1
     return height, found
+
+
+@inlined
+def _counts(
+    query: Query, triangles: Floats, found: Found, t: float, triangle: int, side: int
+) -> bool:
+    """Whether a hit is to be taken instead of the one that is `found` so far.
+
+    At an edge a ray meets two triangles in one place, and only what their edge is like tells
+    whether it crosses both, and which first. From outside, of two that meet in a convex edge the
+    one that faces the ray is first; a ray that has left one of them outwards is past the other. Of
+    a reflex edge the opposite holds.
+    """
+    if query.on_face >= 0:
+        near = t < query.slack * (TIE / ROUNDING)
+        return not near or side * rises(triangles, query.on_face, triangle) > 0.0
+    if side * found.side >= 0 or t < found.t * (1.0 - TIE):
+        return t < found.t
+    return side * rises(triangles, found.triangle, triangle) < 0.0
 
 
 @inlined
@@ -122,19 +146,24 @@ def mesh_hit(
     """The nearest hit before `t_max`.
 
     A ray that has just left triangle `on_face` of this mesh (-1: has not) can only hit other
-    triangles, and only from `side`. Those may begin where it stands, within rounding.
+    triangles, and only from `side`. Those may begin where it stands, within rounding. If it is
+    inside the mesh and finds no way out, rounding has put it past an edge of its triangle.
     """
-    t_min = 0.0
+    slack = 0.0
     if on_face < 0:
         side = 0
     else:
-        t_min = -1e-15 * (abs(o[0]) + abs(o[1]) + abs(o[2]))
-    query = Query(o, d, sight(o, d, nodes, root), t_min, on_face, side)
+        slack = ROUNDING * (abs(o[0]) + abs(o[1]) + abs(o[2]))
     keys = stack.view(np.int64).reshape(-1)
-    keys[BOTTOM] = root
-    height, found = BOTTOM + 1, Found(t_max, -1, 0)
-    while height > BOTTOM:
-        height, found = _step(query, nodes, triangles, keys, height, found)
+    found = Found(t_max, -1, 0)
+    for _ in range(2):
+        query = Query(o, d, sight(o, d, nodes, root), slack, on_face, side)
+        keys[BOTTOM], height = root, BOTTOM + 1
+        while height > BOTTOM:
+            height, found = _step(query, nodes, triangles, keys, height, found)
+        if found.triangle >= 0 or side >= 0 or t_max < INF:
+            break
+        o = along(o, TIE, sub(middle(triangles, on_face), o))
     return found
 
 

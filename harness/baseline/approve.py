@@ -7,7 +7,6 @@ is written before all that was asked for is known to be acceptable.
 from __future__ import annotations
 
 import re
-import subprocess
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -25,6 +24,7 @@ from harness.baseline.run_folder import RunFolder, baseline_of, inside, measured
 from harness.baseline.source import Baselines
 from harness.documents import Model, read, write_bytes
 from harness.errors import InputError, Problem, nearest
+from harness.git import said
 from harness.record import BaselineState, CaseRecord, Check, ImageFile, RendererRun, Verdict
 from harness.scene.load import pattern
 from harness.temporary import temporary_folder
@@ -200,7 +200,7 @@ def approve(
         file = baseline_file(folder, one.record.id, one.run.name)
         approval = Approval(
             at=datetime.now(UTC).replace(microsecond=0).isoformat(), by=by, reason=one.reason,
-            commit=_said_by_git("rev-parse", "HEAD"), version=one.run.version,
+            commit=said(Path(), "rev-parse", "HEAD") or "", version=one.run.version,
             snellcheck_version=__version__, record_sha256=one.record_sha256,
         )  # fmt: skip
         write_baseline(baseline_of(one.record, one.run, approval, images, _earlier(one.kept)), file)
@@ -235,20 +235,10 @@ def _earlier(kept: Kept | None) -> list[Approval]:
 
 def approver() -> str:
     """Who is at work, by git. Raises InputError where git does not know."""
-    name, mail = _said_by_git("config", "user.name"), _said_by_git("config", "user.email")
+    name, mail = (said(Path(), "config", f"user.{key}") for key in ("name", "email"))
     if not name:
         raise InputError.of(
             "git does not know who you are", key="--by",
             expected='`git config user.name "…"`, or --by "name <address>"',
         )  # fmt: skip
     return f"{name} <{mail}>" if mail else name
-
-
-def _said_by_git(*arguments: str) -> str:
-    try:
-        done = subprocess.run(
-            ["git", *arguments], capture_output=True, text=True, check=False, timeout=20
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -12,10 +11,10 @@ from harness.baseline.pictures import restore
 from harness.baseline.run_folder import baselines_of_run
 from harness.baseline.store import LARGEST_PICTURE, Store
 from harness.errors import InputError, Problem
+from harness.git import GitFailed, commit_of, git
 from harness.imagefile import Pixels
 
 FOLDER = "references"  # where baselines lie in a repository
-GIT_SECONDS = 60
 
 
 @dataclass
@@ -84,13 +83,14 @@ def _of_run(folder: Path) -> Baselines:
 
 
 def _of_revision(revision: str) -> Baselines:
-    commit = _git("rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}")
-    if commit is None:
+    try:
+        name = commit_of(Path(), revision)
+    except GitFailed as error:
         raise InputError.of(
-            "neither a folder nor a revision of git", key="--baseline", value=revision[:80],
+            f"neither a folder nor a revision of git: {error}", key="--baseline",
+            value=revision[:80],
             expected="a folder of baselines, the folder of a run, or a commit, branch or tag",
-        )  # fmt: skip
-    name = commit.decode().strip()
+        ) from error  # fmt: skip
     found = Baselines(f"{FOLDER} at {revision} ({name[:12]})", revision=name)
     for path in _tree(name):
         if path.suffix == ".json":
@@ -102,32 +102,24 @@ def _of_revision(revision: str) -> Baselines:
 
 
 def _tree(commit: str) -> Iterator[PurePosixPath]:
-    listed = _git("ls-tree", "-r", "-z", "--name-only", commit, "--", FOLDER)
-    if listed is None:
-        raise InputError.of(f"{FOLDER} cannot be listed at {commit[:12]}", key="--baseline")
+    try:
+        listed = git(Path(), "ls-tree", "-r", "-z", "--name-only", commit, "--", FOLDER)
+    except GitFailed as error:
+        message = f"{FOLDER} cannot be listed at {commit[:12]}: {error}"
+        raise InputError.of(message, key="--baseline") from error
     for name in listed.split(b"\0"):
         if name:
             yield PurePosixPath(name.decode("utf-8", "replace"))
 
 
 def _blob(commit: str, file: Path) -> bytes:
-    data = _git("cat-file", "blob", f"{commit}:./{file.as_posix()}")
-    if data is None:
-        raise InputError.of(f"is not at {commit[:12]}", file=file)
+    try:
+        data = git(Path(), "cat-file", "blob", f"{commit}:./{file.as_posix()}")
+    except GitFailed as error:
+        raise InputError.of(f"cannot be read at {commit[:12]}: {error}", file=file) from error
     if len(data) > LARGEST_PICTURE:
         raise InputError.of(f"larger than {LARGEST_PICTURE} bytes", file=file)
     return data
-
-
-def _git(*arguments: str) -> bytes | None:
-    """What git says, None where it fails."""
-    try:
-        done = subprocess.run(
-            ["git", *arguments], capture_output=True, check=False, timeout=GIT_SECONDS
-        )
-    except (OSError, ValueError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout if done.returncode == 0 else None
 
 
 def _bytes(file: Path, most: int = LARGEST_PICTURE) -> bytes:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.expected import Float
+from harness.measure.light_observables import expected_level
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.rays import RayMeasurement
@@ -111,9 +112,12 @@ def levels(
     n2: bool,
     thin: bool,
 ) -> Levels | None:
-    """From an image of a bright plane; `samples` per pixel where the renderer samples."""
+    """From an image of a bright plane; `samples` per pixel where the renderer samples.
+
+    Raises Unmeasurable where no ray takes the path alone.
+    """
     level = pixels.reshape(-1, 3).astype(np.float64)
-    true = np.nan_to_num(truth.level)
+    true, used = expected_level(truth, n2)
     tolerance = np.tile(
         (quantum + truth.level_tolerance(precision) * true.max(axis=1, initial=1))[:, None], 3
     )
@@ -121,7 +125,7 @@ def levels(
         p = np.clip(true, 1 / samples, 1 - 1 / samples)
         tolerance = tolerance + 2 * np.sqrt(p * (1 - p) / samples)
     error = np.where(np.isfinite(level), np.abs(level - true) / tolerance, np.inf).max(axis=1)
-    rows = _chosen(truth, ~truth.grazing & _known(truth), error)
+    rows = _chosen(truth, used & _known(truth), error)
     if not len(rows):
         return None
     return Levels(_setting(truth, rows, n2, thin), level[rows], tolerance[rows])

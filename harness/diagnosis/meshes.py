@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from harness.diagnosis.edges import nearness
-from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values
+from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, says
 from harness.diagnosis.worlds import World
 from harness.expected import Float
-from harness.scene.resolved import Mesh
+from harness.renderers.base import Rays, Status
+from harness.scene.resolved import Mesh, Vec3
 from harness.truth.law import Mask
 from harness.truth.paths import TruePaths
 
@@ -43,6 +44,42 @@ def stretched_normals(axis: int) -> Hypothesis:
         "stretch²",
         applies=has_mesh,
     )
+
+
+def mirrored_mesh(axis: int) -> Hypothesis:
+    """Meshes read as if the axis pointed the other way: inside stays inside, left becomes right."""
+    flip = np.where(np.arange(3) == axis, -1.0, 1.0)
+
+    def turned(mesh: Mesh) -> Mesh:
+        def flipped(points: tuple[Vec3, ...]) -> tuple[Vec3, ...]:
+            return tuple(map(tuple, (np.array(points) * flip).tolist()))
+
+        return mesh.model_copy(
+            update={
+                "vertices": flipped(mesh.vertices),
+                "triangles": tuple((a, c, b) for a, b, c in mesh.triangles),
+                "normals": None if mesh.normals is None else flipped(mesh.normals),
+            }
+        )
+
+    def past(_: Rays, paths: TruePaths) -> TruePaths:
+        """Rays that the mesh is not in the way of any more go straight on."""
+        missed = (paths.status == Status.MISS) & np.isnan(paths.interface).all(axis=(1, 2))
+        return replace(paths, status=np.where(missed, Status.HIT, paths.status).astype(np.int8))
+
+    def world(world: World, _: Values) -> World:
+        solids = [
+            s.model_copy(update={"shape": turned(s.shape)}) if isinstance(s.shape, Mesh) else s
+            for s in world.scene.solids
+        ]
+        scene = world.scene.model_copy(update={"solids": tuple(solids)})
+        return replace(world, scene=scene, finish=past)
+
+    return Hypothesis(
+        f"mesh-mirrored-{'xyz'[axis]}", world,
+        says(f"reads meshes with the wrong handedness: mirrored in {'xyz'[axis]}"),
+        applies=has_mesh,
+    )  # fmt: skip
 
 
 def leaking_mesh(world: World, a: Values) -> World:

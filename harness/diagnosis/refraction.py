@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from harness.diagnosis.hypothesis import Fitted, Hypothesis, Values, percent, plus_minus, says
-from harness.diagnosis.meshes import has_mesh, leaking_mesh, stretched_normals
+from harness.diagnosis.meshes import has_mesh, leaking_mesh, mirrored_mesh, stretched_normals
 from harness.diagnosis.worlds import World
 from harness.expected import Float, lecture_table_angle, refract
 from harness.renderers.base import Rays
@@ -213,6 +213,11 @@ def _spawned(world: World, a: Values, fixed: float, growing: float) -> World:
     return world.with_law(start=start)
 
 
+def _ahead(world: World, a: Values) -> World:
+    """Rays start a[0] further along their way, which so absorbs less of them."""
+    return world.with_law(start=lambda at, d: at.point + a[0] * d)
+
+
 def _offset(world: World, a: Values) -> World:
     """Where a ray leaves as it came, its sideways shift is a[0] times what it should be."""
 
@@ -321,6 +326,7 @@ REFRACTION = (
         ((0.01,), (-0.01,), (0.2,), (-0.2,)), "excess length",
     ),
     *(stretched_normals(axis) for axis in range(3)),
+    *(mirrored_mesh(axis) for axis in range(3)),
     Hypothesis(
         "spawn-normal", lambda w, a: _spawned(w, a, 1, 0),
         lambda f: f"starts rays {f} units off the surface along its normal, not where they hit",
@@ -339,6 +345,11 @@ REFRACTION = (
         lambda f: "starts rays off the surface along its normal, not where they hit, by "
         f"{f} ({f.values[1]:.2g} + the largest coordinate)",
         tuple((1e-4, 10.0**k) for k in (-6, -4, -2)), "relative offset", kin="spawn",
+    ),
+    Hypothesis(
+        "spawn-ahead", _ahead,
+        lambda f: f"starts rays {f} units further along their way, so that less of it absorbs",
+        ((1e-4,), (1e-6,), (1e-2,)), "offset", "units",
     ),
     Hypothesis(
         "index-fixed", _fixed_index,

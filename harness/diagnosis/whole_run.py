@@ -2,14 +2,15 @@
 
 Each case has told how well every hypothesis fits it, with which parameter and how sharply. Those
 costs add up, with one parameter for all cases. A hypothesis also has to leave alone the cases in
-which nothing is wrong: `Witness` is such a case. What the best cause does not explain is diagnosed
-again, since a renderer may have two faults.
+which nothing is wrong: `Witness` is such a case, and whoever predicts a deviation that it does not
+show is no cause. What the best cause does not explain is diagnosed again, since a renderer may have
+two faults.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,7 +40,10 @@ class Witness:
 
 @dataclass(frozen=True)
 class _Common:
-    """A hypothesis with one parameter for several cases, and what each of them costs with it."""
+    """A hypothesis with one parameter for several cases, and what each of them costs with it.
+
+    `belied_by` is the witness that shows nothing of what it predicts, "" where none does.
+    """
 
     hypothesis: Hypothesis
     values: Values
@@ -47,7 +51,7 @@ class _Common:
     costs: Mapping[str, float]
     explained: tuple[str, ...]
     total: float
-    broken: tuple[str, ...] = field(default=())
+    belied_by: str = ""
 
 
 def diagnose_run(
@@ -56,28 +60,37 @@ def diagnose_run(
     """The causes of what is wrong with `renderer`, the one that explains most cases first."""
     left = dict(by_case)
     found: list[Diagnosis] = []
+    tempting: _Common | None = None
     while left and len(found) < MOST_CAUSES:
         ranked = _ranked(left, witnesses)
-        best = ranked[0]
-        if len(best.explained) < CONVINCING * len(left):
+        best = next((c for c in ranked if not c.belied_by), None)
+        if best is None or not _convinces(best, left):
+            tempting = next((c for c in ranked if c.belied_by and _convinces(c, left)), None)
             break
         varied = [
             case
             for case, d in left.items()
             if case not in best.explained and _shows(best.hypothesis, d)
         ]
-        found.append(_as_diagnosis(renderer, left, ranked, varied))
+        found.append(_as_diagnosis(renderer, left, best, _next(best, ranked), varied))
         left = {case: d for case, d in left.items() if case in found[-1].unexplained}
     if left:
-        found.append(_nothing(renderer, left, found))
+        found.append(_nothing(renderer, left, found, tempting))
     return found
 
 
 def _ranked(left: Mapping[str, Diagnosis], witnesses: Sequence[Witness]) -> list[_Common]:
+    """The best hypotheses, the best first; those that a witness belies keep their place."""
     common = sorted((_common(h, left) for h in LIBRARY), key=lambda c: c.total)
-    held = [_held_against(c, witnesses) for c in common[:CANDIDATES]]
-    held.sort(key=lambda c: c.total)
-    return first_of_kin(held, lambda c: c.total, lambda c: c.hypothesis)
+    held = [replace(c, belied_by=_belying(c, witnesses)) for c in common[:CANDIDATES]]
+    honest, belied = ([c for c in held if bool(c.belied_by) is b] for b in (False, True))
+    if honest:
+        honest = first_of_kin(honest, lambda c: c.total, lambda c: c.hypothesis)
+    return honest + belied
+
+
+def _convinces(common: _Common, left: Mapping[str, Diagnosis]) -> bool:
+    return len(common.explained) >= CONVINCING * len(left)
 
 
 def _shows(hypothesis: Hypothesis, diagnosis: Diagnosis) -> bool:
@@ -164,52 +177,44 @@ def _joint(
     return (mean, *rest), 2 * float(max(weights.sum() ** -0.5, spread))
 
 
-def _held_against(common: _Common, witnesses: Sequence[Witness]) -> _Common:
-    """Adds what it costs where a hypothesis predicts a deviation that is not there."""
-    hypothesis, extra, broken = common.hypothesis, 0.0, []
+def _belying(common: _Common, witnesses: Sequence[Witness]) -> str:
+    """The first witness that shows nothing where the hypothesis predicts a deviation, or ""."""
     for witness in witnesses:
-        cost = cost_of(hypothesis, common.values, witness.evidence)
-        if cost is None:
-            continue
-        if cost > SAME + sum(len(piece.setting.pixel) for piece in witness.evidence) / 2:
-            broken.append(witness.case)
-            extra += cost
-    return _Common(
-        hypothesis, common.values, common.error, common.costs, common.explained,
-        common.total + extra, tuple(broken),
-    )  # fmt: skip
+        cost = cost_of(common.hypothesis, common.values, witness.evidence)
+        rays = sum(len(piece.setting.pixel) for piece in witness.evidence)
+        if cost is not None and cost > SAME + rays / 2:
+            return witness.case
+    return ""
 
 
 def _as_diagnosis(
     renderer: str,
     left: Mapping[str, Diagnosis],
-    ranked: Sequence[_Common],
+    best: _Common,
+    second: _Common | None,
     varied: Sequence[str],
 ) -> Diagnosis:
     """`varied` are cases that show the same with a size of their own."""
-    best = ranked[0]
     mine = {case: left[case] for case in best.explained}
     iors = tuple(sorted({n for d in mine.values() for n in d.iors}))
-    cause, second = _cause(best, mine, iors), _next(ranked)
+    cause = _cause(best, mine, iors)
     other = [case for case in left if case not in best.explained and case not in varied]
     sentence = f"{renderer} {cause.sentence}"
     if len(left) > 1:
         sentence += f": this explains {len(mine)} of {len(left)} cases that are off"
     if varied:
         sentence += f", and with a size of their own {len(varied)} more"
-    if best.broken:
-        sentence += f", although {best.broken[0]}, where it would show, is right"
     return Diagnosis(
-        renderer=renderer, sentence=sentence, cause=cause, runner_up=_cause(second, mine, iors),
+        renderer=renderer, sentence=sentence, cause=cause,
+        runner_up=None if second is None else _cause(second, mine, iors),
         deviation=_deviation(mine), rays=sum(d.rays for d in mine.values()),
         iors=list(iors), cases=[*mine, *varied], unexplained=other,
     )  # fmt: skip
 
 
-def _next(ranked: Sequence[_Common]) -> _Common:
+def _next(best: _Common, ranked: Sequence[_Common]) -> _Common | None:
     """The runner-up: the next one that says something else."""
-    best = ranked[0].hypothesis
-    return next((c for c in ranked[1:] if not akin(c.hypothesis, best)), ranked[1])
+    return next((c for c in ranked if not akin(c.hypothesis, best.hypothesis)), None)
 
 
 def _deviation(cases: Mapping[str, Diagnosis]) -> float:
@@ -234,14 +239,32 @@ def _cause(common: _Common, cases: Mapping[str, Diagnosis], iors: tuple[float, .
     )  # fmt: skip
 
 
-def _nothing(renderer: str, left: Mapping[str, Diagnosis], found: Sequence[Diagnosis]) -> Diagnosis:
+def _nothing(
+    renderer: str,
+    left: Mapping[str, Diagnosis],
+    found: Sequence[Diagnosis],
+    tempting: _Common | None,
+) -> Diagnosis:
+    """`tempting` would explain much, but for a witness that belies it."""
     nearest = [d.cause or d.runner_up for d in left.values()]
     named = next((cause for cause in nearest if cause is not None), None)
-    sentence = no_cause(renderer, named) if named else f"none of the known causes fits {renderer}"
     cases = len(left)
     where = f" in {cases} other case{'s' * (cases > 1)}" if found else ""
+    if tempting is not None:
+        mine = {case: left[case] for case in tempting.explained}
+        named = _cause(tempting, mine, tuple(sorted({n for d in mine.values() for n in d.iors})))
+        sentence = (
+            f"none of the known causes fits what {renderer} does{where}; that it {named.sentence} "
+            f"would explain {len(mine)} of {cases}, but {tempting.belied_by}, where it would "
+            "show, is right"
+        )
+    else:
+        sentence = (
+            no_cause(renderer, named) if named else f"none of the known causes fits {renderer}"
+        )
+        sentence = sentence.replace(" does;", f" does{where};")
     return Diagnosis(
-        renderer=renderer, sentence=sentence.replace(" does;", f" does{where};"), runner_up=named,
+        renderer=renderer, sentence=sentence, runner_up=named,
         deviation=_deviation(left), rays=sum(d.rays for d in left.values()),
         unexplained=list(left),
     )  # fmt: skip

@@ -6,7 +6,6 @@ It works in a worktree of its own, so that the user's files, index and branch st
 from __future__ import annotations
 
 import contextlib
-import os
 import shlex
 import subprocess
 from collections.abc import Callable, Iterator
@@ -15,7 +14,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from harness.errors import InputError
-from harness.history.revision import git
+from harness.git import GitFailed, commit_of, git
 from harness.temporary import temporary_folder
 
 
@@ -58,12 +57,10 @@ def bisect(
     Both ends are tried first: where `good` is not good or `bad` not bad there is nothing to find,
     which is an InputError, as are revisions that git does not know.
     """
-    root = git(repository, "rev-parse", "--show-toplevel")
-    if root is None:
-        raise InputError.of("no git repository", value=str(repository))
+    root = Path(_git(repository, "rev-parse", "--show-toplevel"))
     named = {"--good": good, "--bad": bad}
-    ends = {key: _commit(Path(root), key, name) for key, name in named.items()}
-    with _worktree(Path(root), ends["--bad"]) as tree:
+    ends = {key: _commit(root, key, name) for key, name in named.items()}
+    with _worktree(root, ends["--bad"]) as tree:
         for key, wanted in (("--bad", Answer.BAD), ("--good", Answer.GOOD)):
             step = _step(tree, ends[key], attempt)
             report(step)
@@ -127,29 +124,25 @@ def _culprit(tree: Path, said: str) -> Culprit | None:
 def _worktree(root: Path, commit: str) -> Iterator[Path]:
     with temporary_folder() as folder:
         tree = Path(folder) / "tree"
+        _git(root, "worktree", "prune")  # what a bisection that was killed has left
         _git(root, "worktree", "add", "--quiet", "--detach", str(tree), commit)
         try:
             yield tree
         finally:
-            git(root, "worktree", "remove", "--force", str(tree))
+            with contextlib.suppress(InputError):
+                _git(root, "worktree", "remove", "--force", str(tree))
 
 
 def _commit(root: Path, key: str, name: str) -> str:
-    found = git(root, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{name}^{{commit}}")
-    if not found:
-        raise InputError.of("git knows no such commit", key=key, value=name)
-    return found.splitlines()[-1]
+    try:
+        return commit_of(root, name)
+    except GitFailed as error:
+        raise InputError.of(str(error), key=key, value=name) from error
 
 
 def _git(folder: Path, *arguments: str, expected: int = 0) -> str:
-    """What git prints, in English. Raises InputError with what it says where it fails.
-
-    The exit code `expected` is no failure.
-    """
-    done = subprocess.run(
-        ["git", "-C", str(folder), *arguments],
-        capture_output=True, text=True, check=False, env={**os.environ, "LC_ALL": "C"},
-    )  # fmt: skip
-    if done.returncode not in (0, expected):
-        raise InputError.of(f"git {arguments[0]} failed: {done.stderr.strip()}", value=str(folder))
-    return (done.stdout + done.stderr).strip() if done.returncode else done.stdout.strip()
+    """What git prints. Raises InputError with what it says where it fails."""
+    try:
+        return git(folder, *arguments, expected=expected).decode("utf-8", "replace").strip()
+    except GitFailed as error:
+        raise InputError.of(f"git {arguments[0]}: {error}", value=str(folder)) from error

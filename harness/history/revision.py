@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-TIMEOUT_S = 10
+from harness.git import said
 
 
 @dataclass(frozen=True)
@@ -19,19 +18,7 @@ class Revision:
 
 def revision(folder: Path) -> Revision:
     """That of the repository that `folder` is in. Never raises."""
-    commit = git(folder, "rev-parse", "HEAD")
+    commit = said(folder, "rev-parse", "HEAD")
     if commit is None:
         return Revision()
-    return Revision(commit, bool(git(folder, "status", "--porcelain", "--untracked-files=no")))
-
-
-def git(folder: Path, *arguments: str) -> str | None:
-    """What a git command prints, None where it fails or there is no git."""
-    try:
-        done = subprocess.run(
-            ["git", "-C", str(folder), *arguments],
-            capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S, check=False,
-        )  # fmt: skip
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return done.stdout.strip() if done.returncode == 0 else None
+    return Revision(commit, bool(said(folder, "status", "--porcelain", "--untracked-files=no")))

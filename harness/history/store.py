@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.errors import InputError
+from harness.errors import InputError, utf8
 from harness.history.revision import Revision
 from harness.record import Summary
 
@@ -179,7 +179,7 @@ class History:
             "INSERT INTO runs (started, commit_id, dirty, folder, quality, snellcheck, exit_code, "
             "wall_s) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                summary.started, revision.commit, revision.dirty, str(folder.resolve()),
+                summary.started, revision.commit, revision.dirty, utf8(str(folder.resolve())),
                 summary.quality, summary.snellcheck_version, summary.exit_code, summary.wall_s,
             ),
         )  # fmt: skip

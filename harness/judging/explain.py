@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,7 +51,8 @@ class Explainer:
         if (documented := known_here(contender.name, mine)) is not None:
             return documented
         evidence = list(self._evidence(contender))
-        return diagnose(contender.name, evidence) if evidence else None
+        found = diagnose(contender.name, evidence) if evidence else None
+        return found or unfitted(contender.name, mine)
 
     def _evidence(self, contender: Contender) -> Iterator[Evidence]:
         for probe in self._case.loaded.model.probes:
@@ -87,6 +89,18 @@ class Explainer:
         return np.asarray(level.reshape(shape), np.float32)
 
 
+def unfitted(renderer: str, checks: Sequence[Check]) -> Diagnosis | None:
+    """What is said of checks that fail although no single ray shows why; None where none fails."""
+    off = dict.fromkeys(c.observable for c in checks if c.status is Verdict.FAIL)
+    if not off:
+        return None
+    sentence = (
+        f"{renderer} is off in {', '.join(off)}, and no single rays show a deviation to which a "
+        "cause could be fitted"
+    )
+    return Diagnosis(renderer=renderer, sentence=sentence)
+
+
 # --- a run ----------------------------------------------------------------------------------------
 
 # Of the cases in which a renderer is right, as many are asked what they say against a cause.
@@ -98,6 +112,9 @@ BOUNDARIES = {
 # A renderer that passed deviates by less than its tolerances: as a rule by less than these, and
 # by less than the errors of single precision, which grow near a critical angle.
 POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
+# A coarse renderer has coarser ones; those that its checks tell are of one ray each, others of the
+# same probe may have several times as much.
+SPREAD = 10
 # Of a plane's size: so far aside may a ray be where all checks look at its direction.
 UNSAID = 0.01
 SINGLE = Precision(float(np.finfo(np.float32).eps), float(np.finfo(np.float32).eps))
@@ -116,17 +133,30 @@ def explain_run(
         _, failed, findings = reason.partition(FAILED_PREFLIGHT)
         if failed:
             found.append(explain_preflight(renderer, findings))
-        by_case = {
-            c.id: d
+        new = [
+            (c, d)
             for c in judged
             for d in c.diagnoses
             if d.renderer == renderer and not is_documented(d)
-        }
+        ]
+        by_case = {c.id: d for c, d in new if d.fits}
         if by_case:
             witnesses = list(_witnesses(cases, judged, renderer))
             found += diagnose_run(renderer, by_case, witnesses)
+        found += _unfitted_in_run(renderer, [c for c, d in new if not d.fits])
         found += known_in_run(renderer, judged)
     return found
+
+
+def _unfitted_in_run(renderer: str, cases: Sequence[SummaryCase]) -> Iterator[Diagnosis]:
+    checks = [
+        check
+        for case in cases
+        for check in case.checks
+        if check.renderer == renderer and check.against == "truth"
+    ]
+    if (diagnosis := unfitted(renderer, checks)) is not None:
+        yield diagnosis.model_copy(update={"unexplained": [case.id for case in cases]})
 
 
 def explain_preflight(name: str, findings: str) -> Diagnosis:
@@ -156,7 +186,7 @@ def _witnesses(
 ) -> Iterator[Witness]:
     """Cases in which the renderer passed all checks against the truth, one for each scene file."""
     right = {
-        case.id
+        case.id: mine
         for case in judged
         if (mine := [k for k in case.checks if k.renderer == renderer and k.against == "truth"])
         and all(check.status is Verdict.PASS for check in mine)
@@ -170,7 +200,10 @@ def _witnesses(
             if len(files) > MOST_WITNESSES:
                 return
             try:
-                evidence = tuple(_truth_as_evidence(case, probe) for probe in _measuring(case))
+                slack = Slack.of(right[case.loaded.id])
+                evidence = tuple(
+                    _truth_as_evidence(case, probe, slack) for probe in _measuring(case)
+                )
             except ValueError:
                 continue  # no closed form
             yield Witness(case.loaded.id, evidence)
@@ -191,7 +224,24 @@ def _only_directions(case: PreparedCase, probe: model.Probe) -> bool:
     return used <= DIRECTION_OBSERVABLES | BOUNDARIES
 
 
-def _truth_as_evidence(case: PreparedCase, probe: model.Probe) -> Evidence:
+@dataclass(frozen=True)
+class Slack:
+    """By how much a renderer may be off in a case that it passed: units, radians, and light."""
+
+    point: float
+    turn: float
+    level: float
+
+    @classmethod
+    def of(cls, checks: Sequence[Check]) -> Slack:
+        def largest(unit: str, scale: float = 1.0) -> float:
+            return scale * max((c.tolerance or 0.0 for c in checks if c.unit == unit), default=0.0)
+
+        turn = max(largest("µrad", 1e-6), largest("deg", float(np.radians(1))))
+        return cls(SPREAD * largest("units"), SPREAD * turn, SPREAD * largest(""))
+
+
+def _truth_as_evidence(case: PreparedCase, probe: model.Probe, slack: Slack) -> Evidence:
     truth = probe_truth(expand_thin_slabs(case.scene), probe.path, case.planes(probe))
     lands = np.all([landing.status == Status.HIT for landing in truth.landings], axis=0)
     kept = np.flatnonzero(lands & ~truth.grazing)
@@ -200,14 +250,17 @@ def _truth_as_evidence(case: PreparedCase, probe: model.Probe) -> Evidence:
     setting = Setting(truth.scene, rays, kept, probe.path, truth.planes)
     if probe.measure == "light":
         level = truth.level[kept]
-        tolerance = np.maximum(truth.level_tolerance(SINGLE)[kept, None], LEVEL_TOLERANCE)
+        least = max(LEVEL_TOLERANCE, slack.level)
+        tolerance = np.maximum(truth.level_tolerance(SINGLE)[kept, None], least)
         return Levels(setting, level, np.broadcast_to(tolerance, level.shape))
     size = max(max(plane.size) for plane in truth.planes)
     unsaid = UNSAID * size if _only_directions(case, probe) else POINT_TOLERANCE
+    point = max(unsaid, slack.point, slack.turn * size)
+    turn = max(DIRECTION_TOLERANCE, slack.turn, slack.point)
     return Landings(
         setting, truth.landings[0].point[kept],
         truth.paths.direction[kept] if len(truth.planes) == 2 else None,
         np.ones(len(kept), bool),
-        np.maximum(truth.point_tolerance(SINGLE)[kept], unsaid),
-        np.maximum(truth.direction_tolerance(SINGLE)[kept], DIRECTION_TOLERANCE),
+        np.maximum(truth.point_tolerance(SINGLE)[kept], point),
+        np.maximum(truth.direction_tolerance(SINGLE)[kept], turn),
     )  # fmt: skip

@@ -20,6 +20,7 @@ from harness.measure.pictures import (
     GRAZING,
     PicturePair,
     SampledPicture,
+    contrast,
     geometric_error,
     sensitivity,
 )
@@ -156,6 +157,7 @@ class PairJudge:
                 self._results.picture(b, plan.IMAGE),
                 floor + change,
                 grazing,
+                self._gain * self._contrast,
             )
         return self._made[key]
 
@@ -179,6 +181,13 @@ class PairJudge:
         return box_downsample(fine, plan.AREA_FACTOR)
 
     @cached_property
+    def _shifted(self) -> list[Pixels]:
+        return [self._results.auxiliary(self._helper, role) for role in plan.SHIFTED]
+
+    @cached_property
     def _sensitivity(self) -> Float:
-        shifted = [self._results.auxiliary(self._helper, role) for role in plan.SHIFTED]
-        return sensitivity(self._base, shifted)
+        return sensitivity(self._base, self._shifted)
+
+    @cached_property
+    def _contrast(self) -> Float:
+        return np.asarray(contrast([self._base, *self._shifted]).max(axis=-1))

@@ -10,6 +10,7 @@ import numpy as np
 from harness import plan
 from harness.judging.results import Contender, NotAvailable, Results
 from harness.measure.images import Pixels
+from harness.measure.pixel_areas import over_areas
 from harness.measure.probe_truth import ProbeTruth, probe_truth
 from harness.measure.raymap import ProbeRays
 from harness.measure.rays import RayMeasurement, from_images, from_paths
@@ -81,6 +82,8 @@ class Probed:
             images, truth, cells, preflight.code_quantum, preflight.epsilon, mixed,
             preflight.samples,
         )  # fmt: skip
+        if preflight.averages:
+            measured = over_areas(measured, truth)
         if switched and probe.total_reflection:
             # Where a reflection of the path is partial after all, it was switched off.
             return replace(measured, faint=measured.faint | ~truth.total)

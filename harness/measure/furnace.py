@@ -34,7 +34,8 @@ def is_furnace(scene: ResolvedScene) -> bool:
 @lru_cache(maxsize=1)  # all renderers of a case are held against it, one after the other
 def _furnace(scene: ResolvedScene) -> AllLight:
     limits = scene.transport
-    return light_around(ClosedForm(scene), primary_rays(scene), limits.max_depth, limits.min_weight)
+    rays, depth, least = primary_rays(scene), limits.max_depth, limits.min_weight
+    return light_around(ClosedForm(scene), rays, depth, least, natural=False)
 
 
 def energy(

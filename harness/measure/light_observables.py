@@ -32,7 +32,7 @@ def path_weight(
     emitted in one medium and seen in another carries the ratio of the two.
     """
     measured = pixels.reshape(-1, 3).astype(np.float64)
-    true, used = _expected_level(truth, n2)
+    true, used = expected_level(truth, n2)
     tolerance = quantum + truth.level_tolerance(precision) * true.max(axis=1, initial=1)
     return worst_level(
         truth, measured, true, tolerance, used, nature(truth, used), "Weight of the path",
@@ -44,7 +44,7 @@ def sampled_path_weight(
     truth: ProbeTruth, pixels: NDArray[np.float32], noise: Noise, n2: bool
 ) -> Comparison:
     """The same for a renderer that samples lobes and pixels: means over bins of like angle."""
-    _, used = _expected_level(truth, n2)
+    _, used = expected_level(truth, n2)
     areas = pixel_areas(truth)
     level = areas.paths.weight[:, None] * areas.landing.transmission
     level = np.nan_to_num(level) * _brightening(truth.scene, areas.paths, n2)[:, None]
@@ -141,7 +141,7 @@ def _boundary(
     )  # fmt: skip
 
 
-def _expected_level(truth: ProbeTruth, n2: bool) -> tuple[Float, NDArray[np.bool_]]:
+def expected_level(truth: ProbeTruth, n2: bool) -> tuple[Float, NDArray[np.bool_]]:
     """(m, 3) true pixel values and the rays that count, dark ones among them."""
     landed = truth.landings[0].status == Status.HIT
     # A ray that meets fewer interfaces than the path has goes another way, and may well be lit.

@@ -2,8 +2,9 @@
 
 A pixel tells little where a tiny shift of its ray changes everything, as at the edge of a checker
 cell seen through a ball. So a reference picture is rendered again with its camera shifted by the
-renderers' own geometric error: what changes by more than `GRAZING` grazes an edge and is counted
-apart, and what changes by less adds to the tolerance of its pixel.
+renderers' own geometric error: what changes by more than `GRAZING` grazes an edge, and may show
+anything that is seen around it, but nothing else. What changes by less adds to the tolerance of its
+pixel.
 """
 
 from __future__ import annotations
@@ -30,10 +31,12 @@ from harness.measure.statistics import (
 )
 
 GRAZING = 1e-3
-# More grazing pixels than this share would hide a wrong picture behind them. They are found on the
-# helper's pictures alone, so this judges the scene: no renderer can hide by being wrong. The most
-# crowded rim of a ball has 2.8%; docs/decisions/0009 derives what a share can hide.
-MOST_GRAZING = 0.05
+# Somewhere in each square of so many pixels a side, the scale at which sampled pictures are
+# compared next to that of pixels, one must graze no edge: then no fault of that size can hide
+# behind edges. They are found on the helper's pictures alone, so this judges the scene, and no
+# renderer can hide by being wrong. The largest square of the catalogue, at a ball's rim, has 2
+# (decision 0022).
+SQUARE = REGIONS[1]
 SSIM_FLOOR = 1e-4
 
 
@@ -47,27 +50,47 @@ def sensitivity(picture: Pixels, shifted: Sequence[Pixels]) -> Float:
     return np.asarray(np.max([images.difference(picture, other) for other in shifted], axis=0))
 
 
+def contrast(pictures: Sequence[Pixels]) -> Float:
+    """(H, W, 3) how far apart the values of a pixel and its eight neighbours are in `pictures`."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    near = (3, 3, 1)
+    highest = np.max([maximum_filter(p, near) for p in pictures], axis=0).astype(np.float64)
+    return np.asarray(highest - np.min([minimum_filter(p, near) for p in pictures], axis=0))
+
+
+def largest_square(mask: Mask) -> int:
+    """The side of the largest square of pixels that are all in `mask` (H, W)."""
+    from scipy.ndimage import binary_erosion
+
+    side = 0
+    while side < min(mask.shape) and binary_erosion(mask, np.ones((side + 1,) * 2)).any():
+        side += 1
+    return side
+
+
 def area_error(center: Pixels, samples_a_side: int) -> Float:
     """(H, W, 3) how far the mean of n x n regular samples may be from the mean over a pixel's area.
 
     An edge through a pixel parts it into two levels, which differ by at most the contrast of the
     neighbourhood; regular samples find its place to within half their distance.
     """
-    from scipy.ndimage import maximum_filter, minimum_filter
-
-    near = (3, 3, 1)
-    contrast = maximum_filter(center, near).astype(np.float64) - minimum_filter(center, near)
-    return np.asarray(contrast / (2 * samples_a_side))
+    return np.asarray(contrast([center]) / (2 * samples_a_side))
 
 
 @dataclass(frozen=True)
 class PicturePair:
-    """Two pictures without noise. `tolerance` (H, W) bounds their difference, pixel by pixel."""
+    """Two pictures without noise.
+
+    `tolerance` (H, W) bounds their difference, pixel by pixel, but for those that are `grazing` an
+    edge: `around` (H, W) bounds theirs, the contrast of what is seen there.
+    """
 
     a: Pixels
     b: Pixels
     tolerance: Float
     grazing: Mask
+    around: Float
 
     def __post_init__(self) -> None:
         if self.a.shape != self.b.shape:
@@ -89,12 +112,7 @@ class PicturePair:
 
     def compare(self, observable: Observable) -> Comparison:
         """Raises Unmeasurable for observables that are none of pictures."""
-        keep = ~self.grazing
-        crowded = ""
-        if self.grazing.mean() > MOST_GRAZING:
-            crowded = (
-                f"{self.grazing.mean():.1%} of the pixels graze an edge, too many to leave out"
-            )
+        keep, fault = ~self.grazing, self._fault()
         match observable:
             case Observable.SSIM:
                 value = images.ssim(self.a, self.b, self.data_range)
@@ -107,7 +125,7 @@ class PicturePair:
                     value, 1.0, limit, value >= 1 - limit,
                     "1e-4, which pictures without noise of analytic scenes must reach, and what "
                     "the pixels' tolerances cost in flat windows",
-                    crowded, detail,
+                    fault, detail,
                 )  # fmt: skip
             case Observable.RMSE:
                 value = images.rmse(self.a, self.b, keep)
@@ -117,11 +135,11 @@ class PicturePair:
                 detail["psnr_db"] = psnr if np.isfinite(psnr) else "infinite"
                 return Comparison(
                     value, 0.0, limit, value <= limit, "root mean square of the pixels' tolerances",
-                    crowded, detail,
+                    fault, detail,
                 )  # fmt: skip
             case Observable.MAX_DIFFERENCE:
                 return self._largest(
-                    self.difference, self.tolerance, crowded,
+                    self.difference, self.tolerance, fault,
                     "quanta of both pictures + light cut by weight + roundings of weights + change "
                     "of the pixel when the camera moves by the renderers' geometric error",
                 )  # fmt: skip
@@ -130,17 +148,17 @@ class PicturePair:
                 limit = float(np.quantile(self.tolerance[keep], 0.999))
                 return Comparison(
                     value, 0.0, limit, value <= limit, "the same percentile of the tolerances",
-                    crowded, self._counts(),
+                    fault, self._counts(),
                 )  # fmt: skip
             case Observable.DELTA_E:
                 return self._largest(
-                    images.delta_e(self.a, self.b), images.LAB_SLOPE * self.tolerance, crowded,
+                    images.delta_e(self.a, self.b), images.LAB_SLOPE * self.tolerance, fault,
                     "pixel's tolerance x steepest slope of CIE Lab",
                 )  # fmt: skip
         raise Unmeasurable(f"{observable} is not an observable of two pictures")
 
     def _largest(
-        self, difference: Float, tolerance: Float, crowded: str, derivation: str
+        self, difference: Float, tolerance: Float, fault: str, derivation: str
     ) -> Comparison:
         """The pixel that comes closest to its limit, of those that graze no edge."""
         ratio = np.where(self.grazing, -np.inf, difference / tolerance)
@@ -152,8 +170,24 @@ class PicturePair:
         }
         return Comparison(
             float(difference[y, x]), 0.0, float(tolerance[y, x]), bool(ratio[y, x] <= 1),
-            derivation, crowded, detail,
+            derivation, fault, detail,
         )  # fmt: skip
+
+    def _fault(self) -> str:
+        """What no tolerance excuses: a pixel at an edge that shows nothing of what is there, or
+        edges that leave a whole square without a pixel to be sure of.
+        """
+        side = largest_square(self.grazing)
+        if side >= SQUARE:
+            return f"a square of {side} x {side} pixels is all edges: a fault could hide in it"
+        excess = np.where(self.grazing, self.difference - self.around - self.tolerance, -np.inf)
+        y, x = np.unravel_index(int(excess.argmax()), excess.shape)
+        if excess[y, x] <= 0:
+            return ""
+        return (
+            f"at ({x}, {y}), which grazes an edge, they differ by {self.difference[y, x]:.3g}, and "
+            f"what is seen around it by no more than {self.around[y, x]:.3g}"
+        )
 
     def _counts(self) -> dict[str, float | int | str]:
         grazing = self.difference[self.grazing]
@@ -191,9 +225,13 @@ class SampledPicture:
             case Observable.SSIM:
                 value = images.ssim(self.first, self.reference, data_range)
                 own = images.ssim(self.first, self.second, data_range)
+                # As of two pictures without noise: two seeds of one that has none are the same.
+                left = float(np.mean(area_error(self.center, self.samples_a_side) ** 2))
+                limit = max(1 - own, SSIM_FLOOR) + left / (0.03 * data_range) ** 2
                 return Comparison(
-                    value, 1.0, 1 - own, value >= own,
-                    "its own sampling error: two seeds of it agree no better",
+                    value, 1.0, limit, value >= 1 - limit,
+                    "its own sampling error: two seeds of it agree no better; at least 1e-4, and "
+                    "what the error of the area means costs in flat windows",
                     detail={"ssim_of_two_seeds": own},
                 )  # fmt: skip
             case Observable.RMSE:

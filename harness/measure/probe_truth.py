@@ -138,7 +138,7 @@ class ProbeTruth:
         """The same where radiance scales with the square of the index."""
         return self.all_light_of(self.rays, n2=True)
 
-    def all_light_of(self, rays: Rays, n2: bool) -> AllLight:
+    def all_light_of(self, rays: Rays, n2: bool, natural: bool = True) -> AllLight:
         """The same of other rays of the camera."""
         limits = self.scene.transport
         return light_on(
@@ -148,6 +148,7 @@ class ProbeTruth:
             limits.max_depth,
             limits.min_weight,
             n2,
+            natural,
         )
 
     @property

@@ -36,6 +36,9 @@ LOW, HIGH, MIDDLE = 0.1, 1.0, 0.5
 DARK = 1e-3
 # Of values with errors of up to 0.45%, the most that is let through, a median is off by less.
 MISFIT = 0.01
+# Rows of a pinhole's picture follow the camera's axes. A turn by this much moves corners by more
+# than two pixels, which no error of values feigns that is let through.
+SKEW = 0.05
 
 
 def chart() -> ResolvedScene:
@@ -94,7 +97,7 @@ def examine(images: Mapping[str, Image]) -> tuple[str, ...]:
     if wrong:
         return (wrong,)
     pair = np.stack([images[axis].pixels.astype(np.float64) for axis in AXES])
-    unusable = _unusable(pair)
+    unusable = _unusable(pair) or _the_same(pair)
     if unusable:
         return (unusable,)
     encoding, linear = _encoding(pair)
@@ -128,6 +131,13 @@ def _unusable(pair: Float) -> str:
     if (shown > shown.max() * (1 - 1e-6)).mean() > 0.02:
         return f"radiance is clipped at {shown.max():.4g}"
     return ""
+
+
+def _the_same(pair: Float) -> str:
+    """Whether both images (2, H, W, 3) show one ramp, or ""."""
+    if np.abs(pair[0] - pair[1]).max() > DARK:
+        return ""
+    return "image does not change with the scene: it may be that of an earlier request"
 
 
 def srgb_decode(value: Float) -> Float:
@@ -191,6 +201,8 @@ def _geometry(pair: Float) -> str:
         return "image is distorted: the chart is not where a pinhole shows it"
     if abs(ux) < 0.2 * abs(uy) and abs(vy) < 0.2 * abs(vx):
         return "image is rotated by 90 degrees or transposed"
+    if max(abs(uy / ux), abs(vx / vy)) > SKEW:
+        return "image is sheared or turned: its rows and columns are not those of the camera"
     scale_x, scale_y = ux / tx, vy / sy
     if scale_x < 0 and scale_y < 0:
         return "image is rotated by 180 degrees"

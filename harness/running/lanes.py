@@ -30,8 +30,10 @@ from harness.running.memo import Memo, memo_of
 from harness.scene.resolved import ResolvedScene
 from harness.truth.camera import primary_rays
 
-# With less room than this in the temporary folder, a failure to write is the disk's.
+# With less room than this in the temporary folder, a failure that sounds like it is the disk's, and
+# with hardly any room every failure is: not all programs say what kept them from writing.
 SPARE_BYTES = 16 * 2**20
+HARDLY_ANY_BYTES = 2**20
 
 
 @dataclass(frozen=True)
@@ -98,8 +100,8 @@ class Lane:
         self, renderer: Renderer, settings: RenderSettings, surroundings: Surroundings
     ) -> None:
         self.renderer, self.settings, self.around = renderer, settings, surroundings
-        count = getattr(renderer, "concurrency", 1)
-        self.executor = surroundings.make_executor(count, surroundings.running)
+        self.concurrency: int = getattr(renderer, "concurrency", 1)
+        self.executor = surroundings.make_executor(self.concurrency, surroundings.running)
         self._memo = Memo(renderer.name, "", None, lasting=False)
 
     def start(self) -> None:
@@ -133,7 +135,7 @@ class Lane:
             contender = calibrate(self.renderer, self.settings, self._render)
             if contender.absent is Verdict.SKIP:
                 remedy = self.renderer.health().remedy
-        except ConnectionLost:
+        except (ConnectionLost, DiskFull):
             raise
         except ANYTHING as error:
             reason = f"failed: {_described(error)}"
@@ -147,7 +149,11 @@ class Lane:
         if (known := self._memo.result(job)) is not None and isinstance(known.result, Image):
             return known.result
         start = time.perf_counter()
-        image = self.renderer.render(scene, settings)
+        try:
+            image = self.renderer.render(scene, settings)
+        except RendererFailed as failure:
+            _blame_the_disk(failure)
+            raise
         self._memo.keep(job, image, time.perf_counter() - start)
         return image
 
@@ -161,10 +167,14 @@ class Lane:
         return Done(case, job, result, seconds)
 
 
+class DiskFull(OSError):
+    """There is no room for the files of renderers: every other result would be lost as well."""
+
+
 def perform(renderer: Renderer, job: Job) -> Result:
     """Does one job; whatever goes wrong is the result, so one failure costs one result.
 
-    Raises OSError where the disk is full: then every other result would be lost as well.
+    Raises DiskFull.
     """
     result = _performed(renderer, job)
     if isinstance(result, RendererFailed):
@@ -190,12 +200,12 @@ def _performed(renderer: Renderer, job: Job) -> Result:
 
 
 def _blame_the_disk(failure: RendererFailed) -> None:
-    """Raises OSError where a renderer failed because there was no room for its files."""
+    """Raises DiskFull where a renderer failed because there was no room for its files."""
     why = os.strerror(errno.ENOSPC)
     folder = tempfile.gettempdir()
-    told = f"{failure} {failure.log}"
-    if why in told and shutil.disk_usage(folder).free < SPARE_BYTES:
-        raise OSError(errno.ENOSPC, why, folder)
+    says_so = why in f"{failure} {failure.log}"
+    if shutil.disk_usage(folder).free < (SPARE_BYTES if says_so else HARDLY_ANY_BYTES):
+        raise DiskFull(errno.ENOSPC, why, folder)
 
 
 def calibrate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import queue
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -38,6 +39,10 @@ from harness.running.lanes import (
 from harness.running.memo import Memo
 from harness.scene.resolved import ResolvedScene
 from harness.verdict import unmeasured
+
+# Lanes get the jobs of so many cases at a time, counted from the first that is not judged: a fast
+# renderer that is through with all of them before a slow one has begun fills memory with results.
+AHEAD = 16
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ class Session:
 
     While all renderers turn out to be known from earlier runs, it waits for the last of them, and
     then takes from the cache the cases in which nothing changed. As soon as one is not, all of
-    them get to work.
+    them get to work, none more than `AHEAD` cases before the slowest.
     """
 
     def __init__(
@@ -107,6 +112,9 @@ class Session:
         self.memos: dict[str, Memo] = {}
         self.remedies: dict[str, str] = {}
         self.waiting: list[str] = []  # calibrated, but without jobs so far
+        self.held: dict[str, deque[tuple[int, list[Job]]]] = {name: deque() for name in everyone}
+        self.ahead = max(AHEAD, *(2 * lane.concurrency for lane in self.lanes.values()))
+        self.first = 0  # of the cases that are not judged
         self.all_known = True
         self.states = [_CaseState(case, self.began) for case in cases]
         self.done = self.total = 0
@@ -216,7 +224,16 @@ class Session:
                     state.given[contender.name] = jobs[0].scene
                 state.pending += len(jobs)
                 self.total += len(jobs)
-                self.lanes[contender.name].submit(index, jobs)
+                self.held[contender.name].append((index, jobs))
+        self._hand_out()
+
+    def _hand_out(self) -> None:
+        """Gives the lanes the jobs of all cases that are not too far ahead."""
+        while self.first < len(self.finished) and self.finished[self.first] is not None:
+            self.first += 1
+        for name, held in self.held.items():
+            while held and held[0][0] < self.first + self.ahead:
+                self.lanes[name].submit(*held.popleft())
 
     def _jobs(self, contender: Contender, case: PreparedCase) -> list[Job]:
         assert contender.preflight is not None
@@ -312,6 +329,7 @@ class Session:
             id=written.id, family=written.family, status=written.status, checks=written.checks,
             diagnoses=written.diagnoses,
         )  # fmt: skip
+        self._hand_out()
 
 
 def now() -> str:

@@ -209,7 +209,8 @@ def natural_weight(form: ClosedForm, rays: Rays, path: str) -> Float:
 @dataclass(frozen=True)
 class AllLight:
     """What all paths bring together: `level` (m, 3) by a renderer's unpolarised Fresnel factors,
-    `natural` (m, 3) by nature's, and `cut` (m,) the weight of paths left out: too weak, too long.
+    `natural` (m, 3) by nature's, NaN where it was not asked for, and `cut` (m,) the weight of paths
+    left out: too weak, too long.
     `closest` (m,) is the shortest way between two interfaces on any of them.
     """
 
@@ -226,17 +227,19 @@ def light_on(
     depth: int,
     min_weight: float,
     n2: bool = False,
+    natural: bool = True,
 ) -> AllLight:
     """The radiance that rays see of `plane` shining with radiance 1, by all paths together.
 
-    `n2`: radiance scales with the square of the index of the medium that it is in.
+    `n2`: radiance scales with the square of the index of the medium that it is in. `natural` asks
+    for nature's light, too, which is half the work.
     """
     ior = np.array([medium.ior for medium in form.scene.media])
     per_medium = (ior[form.scene.camera.medium] / ior) ** 2 if n2 else np.ones(len(ior))
     m = len(rays.origins)
-    level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    level, polarised, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     closest = np.full(m, np.inf)
-    for branch in branches(form, rays, depth, min_weight, natural=True):
+    for branch in branches(form, rays, depth, min_weight, natural=natural):
         if branch.path:
             closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         landing = form.meet(
@@ -247,22 +250,24 @@ def light_on(
         rows = branch.rows[on]
         left = landing.transmission[on] * per_medium[branch.medium[on]][:, None]
         level[rows] += branch.weight[on, None] * left
-        natural[rows] += branch.natural[on, None] * left
+        polarised[rows] += branch.natural[on, None] * left
         followed[branch.rows[ends]] += branch.weight[ends]
-    return AllLight(level, natural, 1 - followed, closest)
+    return AllLight(level, polarised if natural else np.full((m, 3), np.nan), 1 - followed, closest)
 
 
-def light_around(form: ClosedForm, rays: Rays, depth: int, min_weight: float) -> AllLight:
+def light_around(
+    form: ClosedForm, rays: Rays, depth: int, min_weight: float, natural: bool = True
+) -> AllLight:
     """The same where everything around shines with radiance 1: a white furnace."""
     m = len(rays.origins)
-    level, natural, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
+    level, polarised, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
     closest = np.full(m, np.inf)
-    for branch in branches(form, rays, depth, min_weight, natural=True):
+    for branch in branches(form, rays, depth, min_weight, natural=natural):
         if branch.path:
             closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         leaves = ~np.isfinite(branch.ahead)
         rows, left = branch.rows[leaves], np.exp(-branch.absorbed[leaves])
         level[rows] += branch.weight[leaves, None] * left
-        natural[rows] += branch.natural[leaves, None] * left
+        polarised[rows] += branch.natural[leaves, None] * left
         followed[rows] += branch.weight[leaves]
-    return AllLight(level, natural, 1 - followed, closest)
+    return AllLight(level, polarised if natural else np.full((m, 3), np.nan), 1 - followed, closest)

@@ -308,6 +308,26 @@ def test_a_revision_of_git_is_a_baseline(work: Invoke) -> None:
         result = work("check", "--run", "out", f"--baseline={wrong}")
         assert result.exit_code == 2
         assert "neither a folder nor a revision" in result.output
+        assert "knows no such commit" in result.output
+
+
+def test_why_git_knows_no_revision_is_told(work: Invoke, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "not a git repository" in work("check", "--run", "out", "--baseline", "v1").output
+    git("init", "--quiet", "source")
+    source = Path("source").absolute()
+    git("-C", str(source), "-c", "user.name=me", "-c", "user.email=me@example.org",
+        "commit", "--quiet", "--allow-empty", "--message", "one")  # fmt: skip
+    git("clone", "--quiet", "--depth=1", source.as_uri(), "clone")
+    monkeypatch.chdir("clone")
+    result = work("check", "--run", "../out", "--baseline", "HEAD~1")
+    assert "this clone is shallow; `git fetch --unshallow`" in result.output
+    monkeypatch.setenv("GIT_TEST_ASSUME_DIFFERENT_OWNER", "1")
+    result = work("check", "--run", "../out", "--baseline", "HEAD")
+    assert "dubious ownership" in result.output
+    assert "git config --global --add safe.directory" in result.output
+    monkeypatch.setenv("PATH", "")
+    result = work("check", "--run", "../out", "--baseline", "HEAD")
+    assert "git cannot be run" in result.output
 
 
 def test_a_slide_over_runs_is_reported_though_each_run_is_fine(work: Invoke) -> None:

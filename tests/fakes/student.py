@@ -14,8 +14,9 @@ from types import ModuleType
 
 import numpy as np
 
+from harness.measure.images import box_downsample
 from harness.renderers.base import Capability
-from harness.scene.resolved import ResolvedScene
+from harness.scene.resolved import Film, ResolvedScene
 from tests.fakes import FakeRenderer
 
 SOURCE = Path(__file__).parents[2] / "docs" / "bring-your-own-renderer" / "student.py"
@@ -86,5 +87,23 @@ def student(
 
     def picture(scene: ResolvedScene) -> np.ndarray:
         return shows(module(*faults).render(sees(scene).model_dump(mode="json")))
+
+    return FakeRenderer(name, picture, capabilities=capabilities)
+
+
+def averaging(
+    *faults: Fault,
+    name: str = "averaging",
+    sees: Callable[[ResolvedScene], ResolvedScene] = lambda scene: scene,
+    capabilities: frozenset[Capability] = CAPABILITIES,
+    side: int = 4,
+) -> FakeRenderer:
+    """A student whose every pixel is the mean of `side` x `side` rays: anti-aliasing, always on."""
+
+    def picture(scene: ResolvedScene) -> np.ndarray:
+        film = Film(width=scene.film.width * side, height=scene.film.height * side)
+        fine = sees(scene).model_copy(update={"film": film})
+        pixels = module(*faults).render(fine.model_dump(mode="json"))
+        return box_downsample(pixels, side)
 
     return FakeRenderer(name, picture, capabilities=capabilities)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -96,13 +97,24 @@ def test_ends_that_are_not_what_they_are_said_to_be(states: str, repository: Rep
     assert repository.git("worktree", "list").count("\n") == 0
 
 
+def test_what_a_bisection_that_was_killed_left_is_cleared_away(
+    repository: Repository, tmp_path: Path
+) -> None:
+    commits = history(repository, "gbb")
+    left = tmp_path / "left"
+    repository.git("worktree", "add", "--quiet", "--detach", str(left))
+    shutil.rmtree(left)
+    bisect(repository.root, commits[0], commits[-1], attempt, lambda _: None)
+    assert repository.git("worktree", "list").count("\n") == 0
+
+
 def test_commits_that_nobody_knows(repository: Repository, tmp_path: Path) -> None:
     history(repository, "g")
     for name in ("v9.9", "--all", "HEAD~5"):
         with pytest.raises(InputError, match="knows no such commit"):
             bisect(repository.root, name, "HEAD", attempt, lambda _: None)
     (tmp_path / "plain").mkdir()
-    with pytest.raises(InputError, match="no git repository"):
+    with pytest.raises(InputError, match="not a git repository"):
         bisect(tmp_path / "plain", "a", "b", attempt, lambda _: None)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -160,6 +161,21 @@ def test_a_renderer_of_ones_own(invoke: Invoke, tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     renderers = summary(tmp_path / "out")["renderers"]
     assert set(renderers) == {"tracer", "mine"}  # type: ignore[call-overload]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are text there")
+def test_names_of_files_need_not_be_text(
+    invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A folder from times before UTF-8, or any at all in a locale without it."""
+    out = os.fsdecode(b"caf\xe9")
+    monkeypatch.setattr(sys, "argv", ["snellcheck", "run", "--out", out])
+    result = invoke("run", "slab", "-r", "student", "--scenes", SCENES, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "caf\ufffd" in str(summary(tmp_path / out)["command"])
+    reason = ("--reason", "measured", "--by", "me")
+    assert invoke("approve", "*", "--run", out, *reason).exit_code == 0
+    assert invoke("check", "--run", out).exit_code == 0
 
 
 def test_jobs_and_seed_are_taken(invoke: Invoke, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from harness.judging.documented import is_documented, known_here, known_in_run
-from harness.judging.explain import explain_run
+from harness.judging.explain import explain_run, unfitted
 from harness.plan import prepare
 from harness.record import Check, Diagnosis, SummaryCase, Verdict
 from harness.run import run
@@ -97,3 +97,16 @@ def test_what_is_new_is_told_apart_from_what_is_documented(tmp_path: Path) -> No
     assert all(name.startswith("slab-offset") for name in found[1].cases)
     assert found[1].sentence.startswith("student deviates in ")
     assert found[1].sentence.endswith(f" as documented: {LOST}")
+
+
+def test_what_no_single_ray_shows_is_said_to_have_no_cause_fitted() -> None:
+    off = check(Verdict.FAIL)
+    dim = off.model_copy(update={"observable": "transmittance"})
+    alone = unfitted("ember", [off, dim, check(Verdict.PASS), check(Verdict.ERROR)])
+    assert alone is not None
+    assert alone.cause is None
+    assert alone.sentence.startswith("ember is off in exit_point, transmittance, and no single")
+    assert unfitted("ember", [check(Verdict.PASS), check(Verdict.ERROR)]) is None
+    (found,) = explain_run([], [case("a", off, diagnoses=(alone,))], {"ember": ""})
+    assert found.sentence.startswith("ember is off in exit_point, and no single")
+    assert found.unexplained == ["a"]

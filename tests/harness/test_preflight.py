@@ -13,7 +13,7 @@ from harness.probe.chart import chart, srgb_decode, srgb_encode
 from harness.renderers.base import Capability, RenderSettings
 from harness.scene.resolved import ResolvedScene
 from tests.fakes import FakeRenderer
-from tests.fakes.student import CAPABILITIES, student
+from tests.fakes.student import CAPABILITIES, averaging, student
 
 WIDTH, HEIGHT = chart().film.width, chart().film.height
 ASPECT = HEIGHT / WIDTH
@@ -61,8 +61,10 @@ def stored_as_srgb(pixels: Float) -> Float:
         (stored_in(16), 0.99 * 0.5 / 65535, 1.01 * (0.5 / 65535 + FLOAT32)),
         # sRGB is steepest at the top: 2.4 / 1.055 times half a step.
         (stored_as_srgb, 0.9 / 255, 1.01 * (0.5 / 255 * 2.4 / 1.055 + FLOAT32)),
+        # Half a step of the binade below 1, whether or not the chart's brightest pixels met it.
+        (lambda p: p.astype(np.float16).astype(float), 2.0**-12, 1.01 * 2.0**-12),
     ],
-    ids=["8 bit", "16 bit", "8 bit sRGB"],
+    ids=["8 bit", "16 bit", "8 bit sRGB", "half floats"],
 )
 def test_coarse_images_pass_with_coarse_figures(
     shows: Callable[[Float], Float], least: float, most: float
@@ -163,6 +165,24 @@ def test_a_wrong_camera_is_named(name: str) -> None:
     assert len(found.split("; ")) == 1  # and nothing else is blamed
 
 
+def test_an_image_of_an_earlier_request_is_not_taken_for_a_mirrored_one() -> None:
+    before: list[Float] = []
+
+    def late(pixels: Float) -> Float:
+        before.append(pixels)
+        return before[max(0, len(before) - 2)]
+
+    found = findings(student(shows=late))
+    assert "earlier request" in found
+    assert "mirrored" not in found
+
+
+@pytest.mark.parametrize(("slant", "wrong"), [(0.01, False), (0.2, True)])
+def test_a_sheared_image_is_not_taken_for_a_shifted_one(slant: float, wrong: bool) -> None:
+    sheared = camera(up=lambda c: plus(c.up, times(slant, c.right)))
+    assert ("sheared or turned" in findings(student(sees=sheared))) is wrong
+
+
 def test_a_shift_too_small_for_ramps_is_found_in_the_codes() -> None:
     assert "shifted by (-0.0050, +0.0000) pixels" in findings(student(sees=moved(0.005, 0)))
 
@@ -178,6 +198,8 @@ def holding(value: float) -> Callable[[Float], Float]:
 
     return shows
 
+
+SEAMS = np.arange(WIDTH) % 16 == 15
 
 PIXELS: dict[str, Callable[[Float], Float]] = {
     "sRGB-encoded": srgb_encode,
@@ -198,7 +220,8 @@ PIXELS: dict[str, Callable[[Float], Float]] = {
     "shape (64, 96)": lambda p: p[..., 0],
     "by no known encoding": lambda p: p**3,
     "image shows 0.3 everywhere": lambda p: 0.3 + 0 * p,
-    "coarser than 8 bits": holding(0.0),
+    "off in 1 of 6144 pixels of the chart by more than 8 bits excuse: by": holding(0.0),
+    "off in 384 of 6144 pixels": lambda p: np.where(SEAMS[:, None], np.roll(p, 1, 1), p),
 }
 
 
@@ -271,3 +294,26 @@ def test_the_format_of_values_is_named(pixels: Callable[[Float], Float], said: s
     """By the largest error of values between 0.1 and 1, as on the chart."""
     true = np.linspace(0.1, 1.0, 36001)
     assert stored_as(1.01 * float(np.abs(pixels(true) - true).max())) == said
+
+
+# --- means over pixels ----------------------------------------------------------------------------
+
+
+def test_anti_aliasing_is_named_where_pixel_centres_are_claimed() -> None:
+    found = findings(averaging())
+    assert "pixels show means over their areas" in found
+    assert "do not claim pixel-centres" in found
+
+
+def test_who_does_not_claim_pixel_centres_may_average() -> None:
+    found = calibrated(averaging(capabilities=CAPABILITIES - {Capability.PIXEL_CENTRES}))
+    assert found.findings == ()
+    assert found.averages
+    assert found.cells == 1
+    assert found.facts()["pixels"] == "means over their areas"
+
+
+def test_means_over_half_of_a_pixel_are_still_shifted() -> None:
+    """Not what averaging can do: the mean of a pixel lies in its middle."""
+    aside = averaging(sees=moved(0.3, 0), capabilities=CAPABILITIES - {Capability.PIXEL_CENTRES})
+    assert "shifted by" in findings(aside)

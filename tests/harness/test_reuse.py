@@ -353,3 +353,18 @@ def test_a_renderer_without_room_for_its_files_is_not_to_blame(
     monkeypatch.setattr("harness.running.lanes.SPARE_BYTES", 2**62)
     with pytest.raises(OSError, match="No space left"):
         go(tmp_path / "a", None, Cramped())
+
+
+@pytest.mark.parametrize("calibrates", [False, True])
+def test_with_hardly_any_room_nobody_needs_to_say_so(
+    calibrates: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Cramped(Remembered):
+        def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
+            if calibrates or scene.solids:
+                raise RendererFailed("it crashed", log="24576 requested and 15328 written")
+            return super().render(scene, settings)
+
+    monkeypatch.setattr("harness.running.lanes.HARDLY_ANY_BYTES", 2**62)
+    with pytest.raises(OSError, match="No space left"):
+        go(tmp_path / "a", None, Cramped())

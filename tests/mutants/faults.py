@@ -130,6 +130,13 @@ class PrintedTable(Rules):
 
 
 @fault
+class Tangents(Rules):  # tan in the place of sin
+    def bend(self, d, n, ior_i, ior_t, entering, leg):
+        c, s, _ = parts(d, n)
+        return at_angle(d, n, np.arctan(ior_i / ior_t * s / np.maximum(c, 1e-12)))
+
+
+@fault
 class Degrees(Rules):
     def bend(self, d, n, ior_i, ior_t, entering, leg):
         c, s, _ = parts(d, n)
@@ -159,6 +166,13 @@ class NeverLeaves(Rules):  # P20
 
 
 @fault
+class StraightIn(Rules):  # refracts on the way out only
+    def bend(self, d, n, ior_i, ior_t, entering, leg):
+        bent, total = by_ratio(d, n, ior_i / ior_t)
+        return np.where(entering[:, None], d, bent), total & ~entering
+
+
+@fault
 class GapSwallowed(Rules):  # P18: surfaces nearer than a are not found, and parity is lost
     def bend(self, d, n, ior_i, ior_t, entering, leg):
         bent, total = by_ratio(d, n, ior_i / ior_t)
@@ -179,9 +193,34 @@ class TirLeaks(Rules):
 
 
 @fault
+class TirClamped(Rules):  # max(k, 0) under the root and no test: half of the light goes astray
+    def bend(self, d, n, ior_i, ior_t, entering, leg):
+        bent, total = by_ratio(d, n, ior_i / ior_t)
+        _, _, along = parts(d, n)
+        return np.where(total[:, None], along, bent), np.zeros(len(d), bool)
+
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        right = super().reflectance(cos_i, ior_i, ior_t, entering)
+        return np.where(right < 1, right, 0.5)
+
+
+@fault
 class NormalNudge(Rules):  # P19
     def start(self, p, d, n):
         return p + self.a * np.sign(dot(d, n))[:, None] * n
+
+
+@fault
+class NormalNudgeRelative(Rules):  # P19, by a share of the coordinates, as floats are spaced
+    def start(self, p, d, n):
+        size = self.a * (1 + np.abs(p).max(axis=1))
+        return p + (size * np.sign(dot(d, n)))[:, None] * n
+
+
+@fault
+class StartAhead(Rules):  # along the ray: it goes on where it should, and absorbs less
+    def start(self, p, d, n):
+        return p + self.a * d
 
 
 @fault
@@ -198,6 +237,21 @@ class MeshInsideOut(Rules):
         if shape["type"] == "mesh":
             inner, outer = outer, inner
         return super().indices(inner, outer, entering, shape)
+
+
+@fault
+class MeshMirrored(Rules):  # read as left-handed: axis a points the other way
+    def __init__(self, a):
+        super().__init__(a)
+        flip = np.where(np.arange(3) == int(a), -1, 1)
+
+        def hit(mesh, origins, directions):
+            vertices = (np.array(mesh["vertices"]) * flip).tolist()
+            wound = np.array(mesh["triangles"])[:, ::-1].tolist()
+            mirrored = mesh | {"vertices": vertices, "triangles": wound}
+            return renderer.hit_mesh(mirrored, origins, directions)
+
+        student.HIT["mesh"] = hit
 
 
 @fault
@@ -238,6 +292,28 @@ class FresnelHardcoded(Rules):  # P8
         wrong = n + self.a * (1.1 - n)
         i, t = np.where(entering, ior_i, wrong), np.where(entering, wrong, ior_t)
         return super().reflectance(cos_i, i, t, entering)
+
+
+@fault
+class FresnelIndexOff(Rules):  # a weight by another index than directions, in proportion
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        denser = 1 + self.a
+        i, t = np.where(entering, ior_i, ior_i * denser), np.where(entering, ior_t * denser, ior_t)
+        return super().reflectance(cos_i, i, t, entering)
+
+
+@fault
+class ExitClear(Rules):
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        right = super().reflectance(cos_i, ior_i, ior_t, entering)
+        return np.where(~entering & (right < 1), 0.0, right)
+
+
+@fault
+class EntryClear(Rules):
+    def reflectance(self, cos_i, ior_i, ior_t, entering):
+        right = super().reflectance(cos_i, ior_i, ior_t, entering)
+        return np.where(entering & (right < 1), 0.0, right)
 
 
 @fault
@@ -427,6 +503,15 @@ class FovOfPortrait(Rules):  # P27: wrong only where the film is higher than wid
 
 
 @fault
+class FovOfHeight(Rules):  # for the height on every film
+    def camera_rays(self, camera, width, height):
+        x, y = centres(width, height)
+        scale = width / height
+        x, y = width / 2 + scale * (x - width / 2), height / 2 + scale * (y - height / 2)
+        return through(camera, width, height, x, y)
+
+
+@fault
 class Mirrored(Rules):
     def shown(self, image):
         return image[:, ::-1]
@@ -454,154 +539,3 @@ class Gamma(Rules):  # 1 is right
 class Brighter(Rules):  # 1 is right
     def shown(self, image):
         return self.a * image
-
-
-# --- on no list -----------------------------------------------------------------------------------
-
-
-@fault
-class Tangents(Rules):  # tan in the place of sin
-    def bend(self, d, n, ior_i, ior_t, entering, leg):
-        c, s, _ = parts(d, n)
-        return at_angle(d, n, np.arctan(ior_i / ior_t * s / np.maximum(c, 1e-12)))
-
-
-@fault
-class Twisted(Rules):  # refracted rays are turned about the normal
-    def bend(self, d, n, ior_i, ior_t, entering, leg):
-        bent, total = by_ratio(d, n, ior_i / ior_t)
-        along = bent - dot(bent, n)[:, None] * n
-        turned = np.cos(self.a) * along + np.sin(self.a) * np.cross(n, along)
-        return unit(turned + dot(bent, n)[:, None] * n), total
-
-
-@fault
-class CoarseNormals(Rules):  # directions kept in a few bits
-    def bend(self, d, n, ior_i, ior_t, entering, leg):
-        bent, total = by_ratio(d, n, ior_i / ior_t)
-        return unit(np.rint(bent / self.a) * self.a), total
-
-
-@fault
-class IndexByAngle(Rules):  # an index that grows with the angle of incidence
-    def bend(self, d, n, ior_i, ior_t, entering, leg):
-        _, s, _ = parts(d, n)
-        eta = ior_i / ior_t
-        return by_ratio(d, n, np.where(entering, eta / (1 + self.a * s**6), eta))
-
-
-@fault
-class FresnelSquared(Rules):  # reflectance of amplitudes, |r|, for that of power
-    def polarised(self, cos_i, cos_t, ior_i, ior_t):
-        s, p = super().polarised(cos_i, cos_t, ior_i, ior_t)
-        return np.sqrt(s), np.sqrt(p)
-
-
-@fault
-class AbsorptionSaturates(Rules):  # 1 / (1 + depth) for exp(-depth)
-    def absorbed(self, sigma, length, d, n, forward, ends_in_reflection):
-        return np.log1p(sigma * length[:, None])
-
-
-@fault
-class StaleNormal(Rules):  # refracts with the normal of the surface before: it was not updated
-    def recalled(self, n, d, before):
-        known = np.isfinite(before[:, 0])
-        before = np.where(known[:, None], before, n)
-        return np.where((dot(d, before) > 0)[:, None], -before, before)
-
-
-@fault
-class FresnelSwappedOut(Rules):  # the two indices swapped on the way out alone
-    def reflectance(self, cos_i, ior_i, ior_t, entering):
-        right = super().reflectance(cos_i, ior_i, ior_t, entering)
-        swapped = super().reflectance(cos_i, ior_t, ior_i, entering)
-        return np.where(entering | (right >= 1), right, swapped)
-
-
-@fault
-class PoppedTwice(Rules):  # leaving an inner solid, the stack of media forgets the outer one, too
-    def indices(self, inner, outer, entering, shape):
-        here, beyond = super().indices(inner, outer, entering, shape)
-        return here, np.where(entering, beyond, 1.0)
-
-
-@fault
-class PoleNormals(Rules):  # a sphere's normals within a of a pole are those of the pole
-    def shape_normal(self, outward, shape):
-        if shape["type"] != "sphere":
-            return outward
-        polar = np.abs(outward[:, 2]) > 1 - self.a
-        pole = np.stack([0 * outward[:, 2], 0 * outward[:, 2], np.sign(outward[:, 2])], axis=1)
-        return np.where(polar[:, None], pole, outward)
-
-
-@fault
-class GridPositions(Rules):  # places on surfaces are kept on a grid
-    too_near = 1e-6
-
-    def start(self, p, d, n):
-        moved = np.rint(p / self.a) * self.a - p
-        return p + moved - dot(moved, n)[:, None] * n
-
-
-@fault
-class ChannelsSwapped(Rules):  # red is absorbed as blue, and blue as red
-    def absorbed(self, sigma, length, d, n, forward, ends_in_reflection):
-        return sigma[:, ::-1] * length[:, None]
-
-
-@fault
-class TirEarly(Rules):  # reflects all light where a little would still pass
-    def bend(self, d, n, ior_i, ior_t, entering, leg):
-        bent, total = by_ratio(d, n, ior_i / ior_t)
-        return bent, total | (np.abs(dot(bent, n)) < self.a)
-
-
-@fault
-class RowsFlicker(Rules):  # one random number for all pixels of a row
-    def shown(self, image):
-        rows = np.random.default_rng(7).uniform(-1, 1, len(image))
-        return image * (1 + self.a * rows)[:, None, None]
-
-
-# --- controls: right, though they look wrong ------------------------------------------------------
-
-
-@fault
-class ControlRelativeR0(Rules):
-    """Schlick's R0 by the relative index; Fresnel's equations by the ratio alone are the same."""
-
-    def reflectance(self, cos_i, ior_i, ior_t, entering):
-        return super().reflectance(cos_i, np.ones_like(ior_i), ior_t / ior_i, entering)
-
-
-@fault
-class ControlSignOfRp(Rules):
-    """The sign of r_p is squared away."""
-
-    def polarised(self, cos_i, cos_t, ior_i, ior_t):
-        s, _ = super().polarised(cos_i, cos_t, ior_i, ior_t)
-        with np.errstate(invalid="ignore"):
-            r_p = (ior_i * cos_t - ior_t * cos_i) / (ior_t * cos_i + ior_i * cos_t)
-        return s, np.nan_to_num(r_p) ** 2
-
-
-@fault
-class ControlN2Elsewhere(Rules):
-    """Radiance is scaled at each interface, and the film takes it out again where it matters."""
-
-    claims = ("radiance-n2",)
-
-    def weights(self, R, total, ior_i, ior_t, cos_i):
-        return R, np.where(total, 0.0, (1 - R) * (ior_i / ior_t) ** 2)
-
-
-@fault
-class ControlSnellsWindow(Rules):
-    """Refraction by angles: all of the upper half space within 97 degrees under water is right."""
-
-    def bend(self, d, n, ior_i, ior_t, entering, leg):
-        _, s, _ = parts(d, n)
-        with np.errstate(invalid="ignore"):
-            return at_angle(d, n, np.arcsin(ior_i / ior_t * s))

@@ -280,6 +280,7 @@ def as_float32(x):
 
 
 def main() -> None:
+    import unlisted  # noqa: F401  (it registers more of them)
     from faults import FAULTS
 
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

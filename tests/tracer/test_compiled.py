@@ -41,6 +41,17 @@ def test_kernels_follow_a_change_in_what_they_call(tmp_path: Path) -> None:
     assert run(tmp_path, code) != "(1.0, 0.0, 0.0)"
 
 
+def test_where_nothing_can_be_kept_it_is_compiled_all_the_same() -> None:
+    """As in a container that runs as somebody without a home."""
+    code = (
+        "from numba.core.caching import CompileResultCacheImpl as places\n"
+        "places._locator_classes = []\n"
+        "from tracer.optics import reflect\n"
+        "print(reflect((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))\n"
+    )
+    assert run(PACKAGE.parent, code) == "(1.0, 0.0, 0.0)"
+
+
 def test_importing_the_package_imports_no_compiler() -> None:
     code = "import sys, tracer; print('numba' in sys.modules, 'numpy' in sys.modules)"
     assert run(PACKAGE.parent, code) == "False False"
