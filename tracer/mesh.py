@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tracer.compiled import called, inlined
 from tracer.errors import SceneError
+from tracer.shapes import vec_at
 from tracer.vector import Vec, add, cross, dot, normalise, scale, sub
 
 Floats = NDArray[np.float64]
@@ -78,8 +79,9 @@ def require_closed(mesh: Mesh, name: str) -> None:
 
 
 @inlined
-def corner(table: Floats, triangle: int, k: int) -> Vec:
-    return table[triangle, 3 * k], table[triangle, 3 * k + 1], table[triangle, 3 * k + 2]
+def corners(table: Floats, triangle: int) -> tuple[Vec, Vec, Vec]:
+    """Of a triangle, or what else there are three vectors of in a row."""
+    return vec_at(table, triangle, 0), vec_at(table, triangle, 3), vec_at(table, triangle, 6)
 
 
 @inlined
@@ -98,16 +100,15 @@ def triangle_distance(
     ray, with errors as small, none slips through a corner between the triangles around it.
     S. Woop, C. Benthin, I. Wald, Watertight ray/triangle intersection, JCGT 2, 2013.
     """
-    a = sub(corner(triangles, triangle, 0), o)
-    b = sub(corner(triangles, triangle, 1), o)
-    c = sub(corner(triangles, triangle, 2), o)
+    a, b, c = corners(triangles, triangle)
+    a, b, c = sub(a, o), sub(b, o), sub(c, o)
     n = cross(sub(b, a), sub(c, a))
     height, approach = dot(n, a), dot(n, d)
     from_side = -1
     if approach < 0.0:
         height, approach, from_side = -height, -approach, 1
     within = slack * (abs(n[0]) + abs(n[1]) + abs(n[2]))
-    if side == -from_side or not -within < height < t_max * approach:
+    if side == -from_side or approach == 0.0 or not -within < height < t_max * approach:
         return INF, 0
     (ax, ay), (bx, by), (cx, cy) = projected(a, d), projected(b, d), projected(c, d)
     u, v, w = cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax
@@ -118,11 +119,7 @@ def triangle_distance(
 
 @inlined
 def middle(triangles: Floats, triangle: int) -> Vec:
-    a, b, c = (
-        corner(triangles, triangle, 0),
-        corner(triangles, triangle, 1),
-        corner(triangles, triangle, 2),
-    )
+    a, b, c = corners(triangles, triangle)
     return scale(1.0 / 3.0, add(a, add(b, c)))
 
 
@@ -140,33 +137,25 @@ def projected(v: Vec, d: Vec) -> tuple[float, float]:
 @inlined
 def rises(triangles: Floats, one: int, other: int) -> float:
     """Above 0 where the outside of triangle `one` holds most of `other`: their edge is reflex."""
-    a = corner(triangles, one, 0)
-    n = cross(sub(corner(triangles, one, 1), a), sub(corner(triangles, one, 2), a))
-    b, c, d = corner(triangles, other, 0), corner(triangles, other, 1), corner(triangles, other, 2)
-    return dot(n, sub(b, a)) + dot(n, sub(c, a)) + dot(n, sub(d, a))
+    a, b, c = corners(triangles, one)
+    n, (p, q, r) = cross(sub(b, a), sub(c, a)), corners(triangles, other)
+    return dot(n, sub(p, a)) + dot(n, sub(q, a)) + dot(n, sub(r, a))
 
 
 @inlined
 def triangle_normal(triangles: Floats, triangle: int) -> Vec:
-    a = corner(triangles, triangle, 0)
-    ab, ac = sub(corner(triangles, triangle, 1), a), sub(corner(triangles, triangle, 2), a)
-    return normalise(cross(ab, ac))
+    a, b, c = corners(triangles, triangle)
+    return normalise(cross(sub(b, a), sub(c, a)))
 
 
 @called
 def smooth_normal(p: Vec, triangles: Floats, triangle: int, normals: Floats, row: int) -> Vec:
     """The normals of the corners, weighted by the barycentric coordinates of `p`."""
-    a, b, c = (
-        corner(triangles, triangle, 0),
-        corner(triangles, triangle, 1),
-        corner(triangles, triangle, 2),
-    )
+    a, b, c = corners(triangles, triangle)
     n = cross(sub(b, a), sub(c, a))
     weight_a = dot(n, cross(sub(b, p), sub(c, p)))
     weight_b = dot(n, cross(sub(c, p), sub(a, p)))
     weight_c = dot(n, cross(sub(a, p), sub(b, p)))
-    mean = add(
-        scale(weight_a, corner(normals, row, 0)),
-        add(scale(weight_b, corner(normals, row, 1)), scale(weight_c, corner(normals, row, 2))),
-    )
+    n_a, n_b, n_c = corners(normals, row)
+    mean = add(scale(weight_a, n_a), add(scale(weight_b, n_b), scale(weight_c, n_c)))
     return normalise(mean)

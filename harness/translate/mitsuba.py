@@ -192,7 +192,7 @@ def _surface(name: str, surface: rs.Surface) -> Node:
             look = {"bsdf": _diffuse(reflectance)}
         case rs.Phong():
             raise RendererUnsupported(
-                f"surface {surface.name!r}: Mitsuba's phong is normalised, and another model"
+                f"surface {surface.name!r}: Mitsuba has no BSDF that is the scene's phong"
             )
         case rs.Mirror(reflectance=reflectance):
             look = {"bsdf": _mirror(reflectance)}

@@ -7,13 +7,16 @@ with k interfaces rounds k times.
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.catalogue import EPS, Row, numbers, rounding_bound, rows
+from tests.catalogue import DATA, EPS, Row, numbers, rounding_bound, rows
 from tests.tracer.scenes import angles, axis_crossing, down, glass, one, prism, slab, wall
 from tracer import optics
 from tracer.camera import Orthographic
@@ -36,6 +39,13 @@ def sind(x: float) -> float:
 
 def cosd(x: float) -> float:
     return math.cos(math.radians(x))
+
+
+def test_every_entry_is_a_test() -> None:
+    """All that the catalogue holds are asked for in this file."""
+    entries = set(json.loads(DATA.read_text("utf-8"))) - {"about"}
+    source = Path(__file__).read_text("utf-8")
+    assert set(re.findall(r'(?:each|rows)\("(\w+)"\)', source)) == entries
 
 
 # --- one interface --------------------------------------------------------------------------------
