@@ -1,7 +1,10 @@
 """How fast the viewer is with large pictures: ``python tests/bench/report_shading.py [SIDE …]``.
 
 Opens a case with two pictures of SIDE x SIDE pixels in Chromium, and measures from the change of
-exposure, zoom or place to the frame that shows it, in milliseconds of wall time.
+exposure or zoom to the frame that shows it, in milliseconds: the median of the wall time, and
+the processor time of the page's main thread per frame, which tells more where others are at work.
+Once side by side on 1400 x 1000, once one picture alone on a screen of 3840 x 2160 (twice as many
+pixels each way as CSS counts).
 """
 
 from __future__ import annotations
@@ -15,12 +18,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import CDPSession, Page, sync_playwright
 
 from harness import record as records
 from harness.report import pack, write_report
 from harness.report.links import page_name
-from tests.bench.report_scale import make_run
+from tests.bench.report_scale import make_run, worked
 
 # A pixel is read back, so that what was drawn has been drawn.
 STEP = """async ([key, times]) => { const found = [];
@@ -44,22 +47,44 @@ def run_with(root: Path, side: int) -> Path:
     return root / "cases" / page_name(records.read_case(record).id)
 
 
+def frames(page: Page, session: CDPSession, key: str, times: int) -> tuple[float, float]:
+    """Median wall time of a frame after `key`, and mean processor time, in ms."""
+    page.evaluate(STEP, [key, 1])
+    before = worked(session)
+    wall = statistics.median(page.evaluate(STEP, [key, times]))
+    return wall, (worked(session) - before) / times
+
+
 def measured(page: Page, address: str) -> Iterator[tuple[str, float]]:
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.setTimeDomain", {"timeDomain": "threadTicks"})
+    session.send("Performance.enable")
     page.goto(address)
-    page.wait_for_selector("#viewer[data-ready]")
-    page.evaluate(STEP, ["e", 1])
-    yield "exposure_ms", statistics.median(page.evaluate(STEP, ["e", 7]))
-    page.keyboard.press("0")
-    yield "exposure_near_ms", statistics.median(page.evaluate(STEP, ["e", 7]))
-    yield "zoom_ms", statistics.median(page.evaluate(STEP, ["+", 5]))
+    page.wait_for_selector("#viewer[data-ready]", timeout=300_000)
+    steps = (
+        ("exposure", "", "e", 9), ("exposure_near", "0", "e", 9), ("zoom", "", "+", 5),
+        ("exposure_of_map", "fd", "e", 9),
+    )  # fmt: skip
+    for name, first, key, times in steps:
+        for press in first:
+            page.keyboard.press(press)
+        wall, cpu = frames(page, session, key, times)
+        yield f"{name}_ms", wall
+        yield f"{name}_cpu_ms", cpu
     page.keyboard.press("f")
     page.keyboard.press("d")
-    page.evaluate(STEP, ["e", 1])
-    yield "exposure_of_map_ms", statistics.median(page.evaluate(STEP, ["e", 7]))
+    page.wait_for_timeout(400)
+    before = worked(session)
+    page.keyboard.press("g")  # all pixels of the screen, as after a drag
+    page.wait_for_timeout(400)
+    yield "at_rest_cpu_ms", worked(session) - before
+
+
+SCREENS = {"two": ((1400, 1000), 1, ""), "alone": ((1920, 1080), 2, "#mode=a")}
 
 
 def main() -> None:
-    sides = [int(text) for text in sys.argv[1:]] or [256, 512, 1024, 2048]
+    sides = [int(text) for text in sys.argv[1:]] or [256, 1024, 2048, 4096]
     program = next(filter(None, map(shutil.which, ("chromium", "google-chrome"))), None)
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as scratch:
         browser = playwright.chromium.launch(
@@ -67,10 +92,15 @@ def main() -> None:
         )
         for side in sides:
             address = run_with(Path(scratch) / str(side), side).as_uri()
-            page = browser.new_page(viewport={"width": 1400, "height": 1000})
-            figures = {k: round(v, 1) for k, v in measured(page, address)}
-            sys.stdout.write(json.dumps({"side": side, **figures}) + "\n")
-            page.close()
+            for name, ((width, height), ratio, mode) in SCREENS.items():
+                page = browser.new_page(
+                    viewport={"width": width, "height": height}, device_scale_factor=ratio
+                )
+                figures = {k: round(v, 1) for k, v in measured(page, address + mode)}
+                line = {"side": side, "pictures": name, **figures}
+                sys.stdout.write(json.dumps(line) + "\n")
+                sys.stdout.flush()
+                page.close()
         browser.close()
 
 

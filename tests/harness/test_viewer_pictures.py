@@ -17,7 +17,7 @@ from playwright.sync_api import Page
 from harness import record as records
 from harness.record import CaseRecord, Verdict
 from harness.report import pack, write_report
-from harness.report.colours import NOT_FINITE, SCALE
+from harness.report.colours import BEYOND, NOT_FINITE, SCALE
 from harness.report.links import page_name
 from harness.report.pictures import display
 from tests.harness.report_fixture import summary_of, write_run
@@ -128,6 +128,29 @@ def test_flip_knows_no_answer_where_there_is_no_number(page: Page, tmp_path: Pat
     assert np.array(shown).reshape(36, 48)[10, 20]
 
 
+def test_bytes_are_those_of_the_picture_files(page: Page, tmp_path: Path) -> None:
+    """From black to beyond white: the byte that Python rounds to, or where it rounds narrowly the
+    one beside it; a float's first twelve bits decide, which is a twentieth of a byte at most.
+    """
+    row = np.geomspace(1e-9, 10, 256).astype(np.float32)
+    row[:6] = 0, -1, -np.inf, np.nan, 1e-40, 65504
+    address = page_of(tmp_path, {"tracer": np.repeat(row[None, :, None], 3, 2).repeat(256, 0)})
+    columns = range(256)
+    place = "mode=a&view=128,128,1"
+    gains = {"": 1.0, "&ev=2.5": 2**2.5, "&ev=-1.5&enc=gamma": 2**-1.5}
+    for how, gain in gains.items():
+        open_page(page, f"{address}#{place}{how}")
+        shown = shown_at(page, *(x - 128 for x in columns))
+        linear = np.repeat(row[None, :, None], 3, 2).astype(float) * gain
+        expected = display(linear)[0].astype(int)
+        if "gamma" in how:
+            finite = np.isfinite(linear[0]).all(axis=1)
+            powers = np.rint(255 * np.clip(linear[0, finite], 0, 1) ** (1 / 2.2))
+            expected[finite] = powers.astype(int)
+        assert np.abs(shown - expected).max() <= 1, how
+        assert (shown == expected).mean() > 0.9, how
+
+
 # --- large pictures -------------------------------------------------------------------------------
 
 WIDE, HIGH = 1501, 901
@@ -166,6 +189,16 @@ def test_seen_from_near_each_pixel_is_itself(page: Page, large: str) -> None:
     assert odd.tolist() == [255, 255, 255]
     there = np.array([[[778 / WIDE, 333 / HIGH, 0.2 + 0.5 * ((15 + 6) % 2)]]]) * np.sqrt(2)
     assert np.abs(beside - display(there)[0, 0].astype(int)).max() <= 1
+
+
+def test_what_was_coarse_while_dragged_is_sharp_at_rest(page: Page, large: str) -> None:
+    open_page(page, f"{large}#mode=diff&every=0&view=777.5,333.5,1")
+    for _ in range(3):
+        page.keyboard.press("e")
+    page.wait_for_timeout(600)
+    odd, *beside = shown_at(page, 0, -1, 1, 2, 3)
+    assert odd.tolist() == list(BEYOND)
+    assert [colour.tolist() for colour in beside] == 4 * [list(SCALE[0])]
 
 
 def test_beside_a_large_picture_there_is_nothing(page: Page, large: str) -> None:

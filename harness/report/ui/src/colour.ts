@@ -88,23 +88,38 @@ export function strip(scale: ScaleName): Uint8ClampedArray {
 
 export type Encoding = "srgb" | "gamma";
 
-// Encoded bytes over a fine grid of linear values: exact to half a byte, and no power per pixel.
-const STEPS = 1 << 14;
-const curves = new Map<Encoding, Uint8Array>();
+// A float's exponent and the first eleven bits of its mantissa tell its byte to a twentieth of a
+// step, so that a table can give it without a root or a power per pixel.
+const DROPPED = 12; // bits
+const NOT_FINITE_BITS = 0x7f800000; // the exponent of NaN and infinities
+const word = new Int32Array(1);
+const float = new Float32Array(word.buffer);
 
-function curve(encoding: Encoding): Uint8Array {
-  let found = curves.get(encoding);
-  if (!found) {
-    found = new Uint8Array(STEPS + 1);
-    for (let k = 0; k <= STEPS; k++) {
-      const x = (k / STEPS) ** 2; // finer where the curve is steep
-      const y = encoding === "gamma" ? x ** (1 / 2.2)
-        : x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055;
-      found[k] = Math.round(255 * y);
-    }
-    curves.set(encoding, found);
+/** Bytes of all floats from black, which is entry 0, to white, by their first bits less `base`. */
+interface Bytes {
+  readonly base: number;
+  readonly table: Uint8Array;
+}
+
+function bytesOf(exposure: number, encoding: Encoding): Bytes {
+  const gain = 2 ** exposure;
+  const first = (value: number): number => {
+    float[0] = value;
+    return (word[0] as number) >> DROPPED;
+  };
+  const base = first(2 ** -24 / gain); // a seventh of a byte where the curve is a power
+  const table = new Uint8Array(first(1 / gain) - base + 2);
+  for (let k = 1; k < table.length; k++) {
+    word[0] = ((base + k) << DROPPED) | (1 << (DROPPED - 1));
+    table[k] = Math.round(255 * encoded((float[0] as number) * gain, encoding));
   }
-  return found;
+  return { base, table };
+}
+
+function encoded(linear: number, encoding: Encoding): number {
+  if (linear >= 1) return 1;
+  if (encoding === "gamma") return linear ** (1 / 2.2);
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * linear ** (1 / 2.4) - 0.055;
 }
 
 /** Linear radiance times 2^exposure, encoded; pixels that are not finite are magenta. */
@@ -112,24 +127,22 @@ export function shadeRadiance(
   planes: Float32Array, exposure: number, encoding: Encoding, out: Uint8ClampedArray,
 ): void {
   const count = planes.length / 3;
-  const gain = 2 ** exposure;
-  const bytes = curve(encoding);
+  const { base, table } = bytesOf(exposure, encoding);
+  const last = table.length - 1;
+  const bits = new Int32Array(planes.buffer, planes.byteOffset, planes.length);
+  const pixels = new Uint32Array(out.buffer, out.byteOffset, count); // red first, as all browsers have
+  const magenta = 0xff000000 | (NOT_FINITE[2] << 16) | (NOT_FINITE[1] << 8) | NOT_FINITE[0];
+  const byte = (float: number): number => { // negative ones are below `base` and black
+    const k = (float >> DROPPED) - base;
+    return table[k < 0 ? 0 : k > last ? last : k] as number;
+  };
   for (let k = 0; k < count; k++) {
-    const at = 4 * k;
-    out[at + 3] = 255;
-    const r = planes[k] as number;
-    const g = planes[k + count] as number;
-    const b = planes[k + 2 * count] as number;
-    if (!Number.isFinite(r + g + b)) {
-      [out[at], out[at + 1], out[at + 2]] = NOT_FINITE;
-      continue;
-    }
-    out[at] = bytes[step(r * gain)] as number;
-    out[at + 1] = bytes[step(g * gain)] as number;
-    out[at + 2] = bytes[step(b * gain)] as number;
+    const r = bits[k] as number;
+    const g = bits[k + count] as number;
+    const b = bits[k + 2 * count] as number;
+    pixels[k] = notFinite(r) || notFinite(g) || notFinite(b) ? magenta
+      : 0xff000000 | (byte(b) << 16) | (byte(g) << 8) | byte(r);
   }
 }
 
-function step(linear: number): number {
-  return linear <= 0 ? 0 : linear >= 1 ? STEPS : Math.round(STEPS * Math.sqrt(linear));
-}
+const notFinite = (float: number): boolean => (float & NOT_FINITE_BITS) === NOT_FINITE_BITS;

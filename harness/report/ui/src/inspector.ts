@@ -22,6 +22,8 @@ export class Inspector {
   private readonly worst = h("div", { class: "worst-pixels" });
   private readonly spread = h("div", { class: "histogram" });
   private readonly clear: HTMLButtonElement;
+  private readonly counted = new WeakMap<Image, Counts>();
+  private spreadOf: readonly (Image | null)[] = [];
   private shown: { title: string; figures: Float32Array | undefined } = { title: "", figures: undefined };
 
   constructor(private readonly jump: (pixel: Pixel) => void, unpin: () => void) {
@@ -95,6 +97,8 @@ export class Inspector {
 
   /** Of the luminance of two pictures, over stops; black and what is not finite are counted apart. */
   histogram(a: Image | null, b: Image | null): void {
+    if (this.spreadOf[0] === a && this.spreadOf[1] === b) return;
+    this.spreadOf = [a, b];
     const shown = [a, b].filter((image, k, all) => image !== null && all.indexOf(image) === k);
     (this.spread.previousElementSibling as HTMLElement).hidden = !a;
     if (!a) {
@@ -102,7 +106,7 @@ export class Inspector {
       return;
     }
     const [low, high] = [-12, 4];
-    const counted = shown.map((image) => counts(image as Image, low, high));
+    const counted = shown.map((image) => this.counts(image as Image, low, high));
     const most = Math.max(1, ...counted.flatMap((c) => [...c.bins]));
     const drawing = svg("svg", { viewBox: "0 0 256 76", role: "img",
       "aria-label": "Histogram of luminance in stops", preserveAspectRatio: "none" });
@@ -116,11 +120,23 @@ export class Inspector {
     this.spread.replaceChildren(drawing,
       h("p", { class: "muted small ends" }, h("span", {}, "2⁻¹²"), h("span", {}, "white = 1"), h("span", {}, "2⁴")),
       h("p", { class: "muted small" }, ...counted.map((one, k) =>
-        `${k ? " B" : "A"}: ${one.black} black, ${one.bad} not finite;`)));
+        `${k ? "; B" : "A"}: ${one.black} black, ${one.bad} not finite`)));
+  }
+
+  private counts(image: Image, low: number, high: number): Counts {
+    let found = this.counted.get(image);
+    if (!found) this.counted.set(image, (found = counts(image, low, high)));
+    return found;
   }
 }
 
-function counts(image: Image, low: number, high: number): { bins: Uint32Array; black: number; bad: number } {
+interface Counts {
+  readonly bins: Uint32Array;
+  readonly black: number;
+  readonly bad: number;
+}
+
+function counts(image: Image, low: number, high: number): Counts {
   const bins = new Uint32Array(BINS);
   const count = image.width * image.height;
   let [black, bad] = [0, 0];

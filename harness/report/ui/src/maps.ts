@@ -46,26 +46,27 @@ export const MAPS: Partial<Record<Mode, MapMode>> = {
   rays: { title: "ray error", unit: "µrad", scale: (exposure) => ({ ...up(1e5, 9)(exposure), gaps: true }), figures: null },
 };
 
-/** Of figures (W × H): the largest that are not neighbours of a larger one, with their places. */
+/**
+ * Of figures (W × H): the largest that are not neighbours of a larger one, with their places. Looks
+ * for one after the other: that is exact, and sorting millions of figures is not to be waited for.
+ */
 export function worstPixels(
   figures: Float32Array, width: number, most = 8,
 ): { x: number; y: number; value: number }[] {
-  const reach = Math.max(2, Math.round(width / 48));
-  const rank = (k: number): number => {
-    const value = Math.abs(figures[k] as number);
-    return Number.isNaN(value) ? -1 : value;
-  };
-  const order = Uint32Array.from(figures.keys()).filter((k) => rank(k) > 0);
-  const threshold = [...Array.from(order, rank)].sort((p, q) => q - p)[4000] ?? 0;
-  const candidates = [...order].filter((k) => rank(k) >= threshold).sort((p, q) => rank(q) - rank(p));
+  const near = Math.max(2, Math.round(width / 48)) ** 2;
   const found: { x: number; y: number; value: number }[] = [];
-  for (const k of candidates) {
-    const x = k % width;
-    const y = Math.floor(k / width);
-    if (found.every((f) => Math.hypot(f.x - x, f.y - y) > reach)) {
-      found.push({ x, y, value: figures[k] as number });
-      if (found.length === most) break;
+  const taken = (k: number): boolean => {
+    const [x, y] = [k % width, Math.floor(k / width)];
+    return found.some((f) => (f.x - x) ** 2 + (f.y - y) ** 2 <= near);
+  };
+  while (found.length < most) {
+    let [best, at] = [0, -1]; // NaN is never larger
+    for (let k = 0; k < figures.length; k++) {
+      const size = Math.abs(figures[k] as number);
+      if (size > best && !taken(k)) [best, at] = [size, k];
     }
+    if (at < 0) break;
+    found.push({ x: at % width, y: Math.floor(at / width), value: figures[at] as number });
   }
   return found;
 }

@@ -10,6 +10,7 @@ import type { Sheet, View } from "./pane";
 import { cropped, halved, mean, type Part, type Planes, worst } from "./pyramid";
 
 const LARGE = 512 * 512; // pixels; what is smaller is shaded as a whole, and then moves for nothing
+const IN_HURRY = 1 << 20; // pixels of all pictures together that are shaded while a slider is dragged
 
 interface Source {
   readonly id: string;
@@ -20,6 +21,9 @@ interface Source {
 }
 
 export class Sheets {
+  /** While set, large pictures are shaded coarser than the screen, `shares` of them at once. */
+  hurry = false;
+  shares = 1;
   private readonly known = new Map<string, { key: string; canvas: HTMLCanvasElement }>();
   private readonly smaller = new Map<Float32Array, Planes>();
 
@@ -45,7 +49,8 @@ export class Sheets {
       paint: (context, view, width, height) => {
         const { planes } = source;
         const [across, down] = [(width / planes.width) * view.scale, (height / planes.height) * view.scale];
-        const { level, factor } = this.level(source, Math.max(across, down));
+        const seen = Math.min(planes.width, view.width / across) * Math.min(planes.height, view.height / down);
+        const { level, factor } = this.level(source, Math.max(across, down), seen);
         const part = inView(level, view, across * factor, down * factor);
         if (!part) return;
         const canvas = this.shaded(source, level, part);
@@ -63,15 +68,18 @@ export class Sheets {
   }
 
   /**
-   * Of a large picture the smallest form that has a pixel for each of the screen's, of any map one
-   * that has no more.
+   * Of a large picture a form that has about a pixel for each of the screen's, of any map one that
+   * has no more; `seen` is how many of its own pixels are in view.
    */
-  private level({ planes, light }: Source, scale: number): { level: Planes; factor: number } {
+  private level({ planes, light }: Source, scale: number, seen: number): { level: Planes; factor: number } {
     let [level, factor] = [planes, 1];
     const pool = light ? mean : worst;
-    const wanted = (): boolean => light
-      ? level.width * level.height > LARGE && scale * factor <= 0.5
-      : level.width * level.height > 1 && scale * factor < 1;
+    const wanted = (): boolean => {
+      const size = level.width * level.height;
+      const room = IN_HURRY / this.shares / (light ? 1 : 4); // figures take a logarithm each
+      if (size > LARGE && this.hurry && seen / factor ** 2 > room) return true;
+      return light ? size > LARGE && scale * factor <= Math.SQRT1_2 : size > 1 && scale * factor < 1;
+    };
     while (wanted()) {
       let next = this.smaller.get(level.data);
       if (!next) this.smaller.set(level.data, (next = halved(level, pool)));

@@ -21,6 +21,7 @@ import { fromHash, type Mode, type Pixel, toHash, type ViewState } from "./state
 import { bindViewerKeys } from "./viewerkeys";
 
 const BLINK = 650; // ms
+const AT_REST = 150; // ms after the last change of exposure
 
 export class Viewer {
   readonly element: HTMLElement;
@@ -43,6 +44,7 @@ export class Viewer {
   private showsB = false; // blinking, or Shift held
   private held = false;
   private timer = 0;
+  private resting = 0;
   private scheduled = false;
   private blinking = 0;
   private places = 1; // panes, and those that say why there is none
@@ -105,9 +107,21 @@ export class Viewer {
   private update(change: Partial<ViewState>): void {
     const structural = ["mode", "a", "b", "every"].some((key) => key in change);
     Object.assign(this.state, change);
+    if ("exposure" in change) this.hurry();
     if (structural) this.rebuild();
     else this.refresh();
     this.remember();
+  }
+
+  /** While exposure is dragged, frames matter more than pixels; they come when it rests. */
+  private hurry(): void {
+    this.sheets.hurry = true;
+    this.sheets.shares = this.panes.length;
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => {
+      this.sheets.hurry = false;
+      this.schedule();
+    }, AT_REST);
   }
 
   private remember(): void {
