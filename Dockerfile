@@ -23,11 +23,11 @@ COPY tracer /opt/snellcheck/tracer
 COPY scenes /opt/snellcheck/scenes
 COPY references /opt/snellcheck/references
 RUN /opt/venv/bin/pip install --no-cache-dir --no-deps /opt/snellcheck[mitsuba] \
-    && useradd --create-home snell
+    && useradd --uid 10001 --create-home snell
 ENV PATH=/opt/venv/bin:$PATH
 
 # Renderers are other people's programs: nothing of this runs as root.
-USER snell
+USER 10001
 WORKDIR /work
 RUN snellcheck doctor || true
 ENTRYPOINT ["snellcheck"]

@@ -30,6 +30,7 @@ BUSY_JOBS, BUSY_SIZE = 24, 768
 SMALL_JOBS, SMALL_SIZE = 300, 4
 SETTINGS = RenderSettings(threads=1)
 MILLION = 1_000_000
+CORE_HOUR, GB_MONTH = 0.05, 0.025  # $, of the order of what clouds ask
 PAGE = ROOT / "docs" / "scale.md"
 
 TEXT = """\
@@ -66,8 +67,13 @@ recorded times, and `snellcheck merge` puts the parts together and refuses what 
 or of another version. With 100 shards a client has 10⁴ cases and {shard_h:.1f} hours of parcels,
 while its workers render.
 
+Were every job as large as the one measured, 10⁶ cases would be {core_h:.0f} core-hours of
+rendering, {compute:.0f} $ at {core_hour} $ a core-hour, and {images_tb:.0f} TB of images on their
+way to clients, or {shard_gb:.0f} GB to each of 100. Keeping the records is {keeping:.0f} $ a month
+at {gb_month} $ a GB. Both prices are assumptions: put yours in their place.
+
 Records of 10⁶ cases are {records_gb:.0f} GB without pictures; a shard's are {shard_mb:.0f} MB. A
-report's index grows by about a kilobyte for each case, so a report is best made for a shard, and
+report's index grows by some kilobytes for each case, so a report is best made for a shard, and
 `summary.json` for everything. Results go to disk as they come, and a run that ended early goes on
 where it was.
 """
@@ -109,13 +115,18 @@ def main(run: Path) -> None:
     overhead_s = (carried - computed) / SMALL_JOBS
     record_kb = sum(file.stat().st_size for file in files) / len(files) / 1e3
     per_case = (summary.effort.rendered + summary.effort.reused) / len(files)
+    back_kb = sum(map(len, pack_result(engine.render(busy, SETTINGS)).blocks.values())) / 1e3
+    core_h = MILLION * per_case * direct / 3600
+    images_tb = MILLION * per_case * back_kb / 1e9
     text = TEXT.format(
         version=summary.snellcheck_version, cores=os.cpu_count(),
         python=platform.python_version(), system=platform.system(),
         jobs=BUSY_JOBS, size=BUSY_SIZE, direct=direct, one=one, two=two,
         efficiency=one / two / 2, overhead=overhead_s * 1e3,
         there=(len(json.dumps(parcel.meta)) + sum(map(len, parcel.blocks.values()))) / 1e3,
-        back=sum(map(len, pack_result(engine.render(busy, SETTINGS)).blocks.values())) / 1e3,
+        back=back_kb, core_h=core_h, compute=core_h * CORE_HOUR, core_hour=CORE_HOUR,
+        images_tb=images_tb, shard_gb=images_tb * 10,
+        keeping=MILLION * record_kb / 1e6 * GB_MONTH, gb_month=GB_MONTH,
         record=record_kb, per_case=per_case,
         client_h=MILLION * per_case * overhead_s / 3600, fed=direct / overhead_s,
         shard_h=MILLION * per_case * overhead_s / 3600 / 100,
