@@ -41,24 +41,24 @@ class Headline:
 
 def headline(summary: Summary) -> Headline:
     counts = dict.fromkeys(Verdict, 0)
-    bad: list[tuple[tuple[int, float], str, CheckView]] = []
-    good: list[tuple[float, str, CheckView]] = []
+    worst: tuple[tuple[int, float], str, CheckView] | None = None
+    closest: tuple[float, str, CheckView] | None = None
     for case in summary.cases:
         for check in case.checks:
             counts[check.status] += 1
             view = check_view(check)
             if check.status in BAD:
-                bad.append((view.rank, case.id, view))
+                if worst is None or view.rank < worst[0]:
+                    worst = view.rank, case.id, view
             elif check.status == Verdict.PASS and view.ratio:
-                good.append((-view.ratio, case.id, view))
+                if closest is None or view.ratio > closest[0]:
+                    closest = view.ratio, case.id, view
     state, text = _sentence(summary, counts)
     also = _also(summary, counts)
-    if bad:
-        _, case_id, view = min(bad, key=lambda item: item[0])
-        return Headline(state, text, also, "Worst:", view, case_id)
-    if good:
-        _, case_id, view = min(good, key=lambda item: item[0])
-        return Headline(state, text, also, "Closest to its limit:", view, case_id)
+    if worst:
+        return Headline(state, text, also, "Worst:", worst[2], worst[1])
+    if closest:
+        return Headline(state, text, also, "Closest to its limit:", closest[2], closest[1])
     return Headline(state, text, also)
 
 
