@@ -98,7 +98,7 @@ def test_povray_shows_the_closed_form(light: rs.Light) -> None:
 def test_each_renderer_is_asked_for_what_it_can() -> None:
     assert {Capability.PHONG, Capability.DIRECTIONAL_LIGHT} <= needs(glossy(SUN))
     assert Capability.DIRECTIONAL_LIGHT not in needs(glossy(LAMP))
-    with pytest.raises(RendererUnsupported, match="normalised"):
+    with pytest.raises(RendererUnsupported, match="no BSDF that is the scene's phong"):
         mitsuba.describe(glossy(SUN))
     node = mitsuba.describe(board(rs.Diffuse(reflectance=tuple(RHO)), SUN))
     assert node["light_0"]["type"] == "directional"

@@ -343,8 +343,7 @@ export class Viewer {
   /** Pins a pixel and brings it into view. */
   jump(pixel: Pixel): void {
     const others = this.state.pins.filter((p) => p.x !== pixel.x || p.y !== pixel.y);
-    const fitting = this.panes[0]?.fitting ?? 1;
-    const scale = Math.max(this.state.camera?.scale ?? 0, fitting * 4);
+    const scale = Math.max(this.state.camera?.scale ?? 0, 4 * (this.panes[0]?.fitting ?? 1));
     this.hovered = null;
     this.update({
       pins: [...others, pixel].slice(-9),
@@ -389,8 +388,7 @@ export class Viewer {
   }
 
   private choose(which: "a" | "b", name: string): void {
-    const shows = this.state.mode === "side" ? { mode: which as Mode } : {};
-    this.update({ [which]: name, ...shows });
+    this.update({ [which]: name, ...(this.state.mode === "side" ? { mode: which as Mode } : {}) });
   }
 
   private hold(down: boolean): void {
