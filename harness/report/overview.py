@@ -50,9 +50,8 @@ def headline(summary: Summary) -> Headline:
             if check.status in BAD:
                 if worst is None or view.rank < worst[0]:
                     worst = view.rank, case.id, view
-            elif check.status == Verdict.PASS and view.ratio:
-                if closest is None or view.ratio > closest[0]:
-                    closest = view.ratio, case.id, view
+            elif check.status == Verdict.PASS and (ratio := view.ratio):
+                closest = (ratio, case.id, view) if not closest or ratio > closest[0] else closest
     state, text = _sentence(summary, counts)
     also = _also(summary, counts)
     if worst:
