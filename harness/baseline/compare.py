@@ -69,7 +69,7 @@ def compare(run: RunFolder, baselines: Baselines, wanted: Wanted) -> Comparison:
     for problem in baselines.unreadable:
         result.lost.append(
             LostCheck(case=str(problem.file), renderer="", state=BaselineState.MISSING,
-                      reason=str(problem))
+                      reason=problem.said)
         )  # fmt: skip
     return result
 

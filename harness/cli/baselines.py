@@ -32,13 +32,17 @@ def default_baseline() -> str:
     return str(BASELINES if BASELINES.is_dir() else references_root())
 
 
-def stand_in_sources() -> list[Baselines]:
-    """Where results of missing renderers are looked for: here first, then what came along."""
+def stand_in_sources(store: str) -> list[Baselines]:
+    """Where results of missing renderers are looked for: here first, then what came along.
+
+    Their large pictures are looked for in `store`, a folder or a URL.
+    """
     from harness.baseline.source import open_baselines
+    from harness.baseline.store import store_at
     from harness.data import references_root
 
     folders = dict.fromkeys(f.resolve() for f in (BASELINES, references_root()) if f.is_dir())
-    return [open_baselines(str(folder)) for folder in folders]
+    return [open_baselines(str(folder), store_at(store)) for folder in folders]
 
 
 def show_states(summary: Summary, console: Console | None = None) -> None:

@@ -164,7 +164,8 @@ def test_errors_are_not_approved(renderer: str, invoke: Invoke) -> None:
         (["slab", "--reason", "  "], "say why"),
         (["slabs", "--reason", "x"], "did you mean"),
         (["slab", "--reason", "x", "-r", "povray"], "not a renderer of the run"),
-        (["--reason", "x"], "name the cases"),
+        (["--reason", "x"], "nothing to approve"),
+        (["slab", "--reason", "x", "--from", "none.json"], "both cases and --from"),
         (["--reason", "x", "--from", "none.json"], "cannot be read"),
     ],
 )
@@ -269,6 +270,7 @@ def test_an_unreadable_baseline_fails(damage: object, said: str, work: Invoke) -
     result = work("check", "--run", "out")
     assert result.exit_code == 1
     assert said in result.output.replace("\n", "")
+    assert result.output.count(path.name) == 1
 
 
 def test_a_changed_scene_makes_its_baseline_stale(work: Invoke, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from harness.cli.errors import reports_errors
-from harness.cli.options import run_option
+from harness.cli.options import run_option, store_option
 
 
 @click.command(name="check")
@@ -27,6 +27,7 @@ from harness.cli.options import run_option
     "--history", type=click.Path(path_type=Path, file_okay=False, exists=True),
     help="Folder of earlier runs, to find slow drift.",
 )  # fmt: skip
+@store_option
 @reports_errors
 def command(
     case: tuple[str, ...],
@@ -35,6 +36,7 @@ def command(
     renderers: tuple[str, ...],
     partial: bool,
     history: Path | None,
+    store: str,
 ) -> None:
     """Compare a run with what was approved: all CASEs, or those a glob like "slab-*" selects.
 
@@ -47,12 +49,13 @@ def command(
     from harness.baseline.select import of_run, selector
     from harness.baseline.shown import show_pictures
     from harness.baseline.source import open_baselines
+    from harness.baseline.store import store_at
     from harness.baseline.trend import deviations, read_history, trends
     from harness.cli.baselines import default_baseline, show_states
     from harness.report import write_report
 
     run = read_run(folder)
-    baselines = open_baselines(where or default_baseline())
+    baselines = open_baselines(where or default_baseline(), store_at(store))
     wanted = selector(case, renderers, run, baselines)
     comparison = compare(run, baselines, of_run(run, wanted) if partial else wanted)
     earlier = read_history(history) if history else []
