@@ -15,6 +15,7 @@ from harness.record import BaselineState, Summary
 if TYPE_CHECKING:
     from harness.baseline.approve import Plan
     from harness.baseline.source import Baselines
+    from harness.baseline.stand_in import StandIns
 
 MOST_LINES = 40
 STYLE = {
@@ -32,17 +33,21 @@ def default_baseline() -> str:
     return str(BASELINES if BASELINES.is_dir() else references_root())
 
 
-def stand_in_sources(store: str) -> list[Baselines]:
-    """Where results of missing renderers are looked for: here first, then what came along.
+def stand_ins(store: str, quality: str) -> StandIns:
+    """What stands in for missing renderers: looked for here first, then in what came along.
 
-    Their large pictures are looked for in `store`, a folder or a URL.
+    Large pictures are looked for in `store`, a folder or a URL.
     """
     from harness.baseline.source import open_baselines
+    from harness.baseline.stand_in import StandIns
     from harness.baseline.store import store_at
     from harness.data import references_root
 
-    folders = dict.fromkeys(f.resolve() for f in (BASELINES, references_root()) if f.is_dir())
-    return [open_baselines(str(folder), store_at(store)) for folder in folders]
+    def sources() -> list[Baselines]:
+        folders = dict.fromkeys(f.resolve() for f in (BASELINES, references_root()) if f.is_dir())
+        return [open_baselines(str(folder), store_at(store)) for folder in folders]
+
+    return StandIns(sources, quality)
 
 
 def show_states(summary: Summary, console: Console | None = None) -> None:

@@ -80,6 +80,7 @@ class _Report:
 
     def __init__(self, run_folder: Path, summary: Summary) -> None:
         self.folder = run_folder
+        self.top, self.below = RunFolder(run_folder), RunFolder(run_folder, up="../")
         self.summary = summary
         self.order = view.case_order(summary)
         self.place = {case.id: k for k, case in enumerate(self.order)}
@@ -134,9 +135,8 @@ class _Report:
 
     def _row(self, case: SummaryCase, record: CaseRecord | None, note: str) -> view.Line:
         page = f"cases/{url(page_name(case.id))}" if record else None
-        folder = RunFolder(self.folder)
         row = view.row(
-            case, record, self.renderers, self.colours, folder, page=page, note=clean(note)
+            case, record, self.renderers, self.colours, self.top, page=page, note=clean(note)
         )
         return view.line(row, Markup(self.row_template.render(row=row, absent=self.absent)))
 
@@ -157,14 +157,13 @@ class _Report:
         named += [path for run in record.runs for path in run.files.values()]
         named += [d.path for d in record.differences]
         named += [name for image in images for name in (image.path, image.picture, image.thumbnail)]
-        folder = RunFolder(self.folder)
-        there = [folder.href(name) for name in named if name]
+        there = [self.top.href(name) for name in named if name]
         neighbours = repr(self._neighbours(record.id))
         shown = [self.code, self.summary.snellcheck_version, dict(self.colours), there, neighbours]
         return hashlib.sha256(path.read_bytes() + json.dumps(shown).encode()).hexdigest()
 
     def case(self, record: CaseRecord, path: Path, stamp: str) -> str:
-        folder = RunFolder(self.folder, up="../")
+        folder = self.below
         runs = [
             (run, verdict, [view.picture(image, folder) for image in run.images])
             for run in record.runs

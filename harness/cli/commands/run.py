@@ -108,9 +108,8 @@ def command(
     goes on where it stood.
     """
     from harness import show
-    from harness.baseline.stand_in import StandIns
     from harness.cache.cache import open_cache
-    from harness.cli.baselines import stand_in_sources
+    from harness.cli.baselines import stand_ins
     from harness.cli.interrupts import terminable
     from harness.cli.places import places
     from harness.cores import core_count
@@ -139,7 +138,7 @@ def command(
                 threads=place.threads(jobs or core_count()), timeout_s=timeout, memory_mb=memory,
                 report=progress, cache=cache,
                 command=" ".join(["snellcheck", *sys.argv[1:]]), must_run=must_run,
-                stand_ins=StandIns(stand_in_sources(store), quality) if stored else None,
+                stand_ins=stand_ins(store, quality) if stored else None,
             )  # fmt: skip
     if cache is not None and cache.trouble:
         click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)
