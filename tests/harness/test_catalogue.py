@@ -15,7 +15,7 @@ from harness.data import scenes_root
 from harness.judging.judge import CaseJudge
 from harness.judging.results import Contender, Result, Results
 from harness.measure.observables import IMAGE_OBSERVABLES, TRUTH_OBSERVABLES, Observable
-from harness.measure.truths import TRUTHS, page
+from harness.measure.truths import QUANTITIES, TRUTHS, Quantity, page
 from harness.plan import Form, PreparedCase, light_role, prepare, trace_role
 from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Verdict
@@ -149,6 +149,22 @@ def test_every_case_names_its_truth_and_its_sources(name: str) -> None:
         else:
             assert Observable(check.observable) not in TRUTHS
             assert check.against == "renderers" or check.against in registry.available()
+
+
+@pytest.mark.parametrize("quantity", QUANTITIES, ids=lambda q: q.name)
+def test_every_quantity_is_asked_for_where_the_page_says(quantity: Quantity) -> None:
+    assert quantity.scenes
+    for name in quantity.scenes:
+        asked = {check.observable for check in first_cases()[name].model.checks}
+        assert quantity.observable in asked
+
+
+def test_no_observable_of_the_truth_is_left_out_of_the_quantities() -> None:
+    """But for what all scenes ask for, or a renderer's two ways of telling the same."""
+    everywhere = {
+        Observable.EXIT_DIRECTION, Observable.VARIANT_AGREEMENT, Observable.RAY_AGREEMENT
+    }  # fmt: skip
+    assert {q.observable for q in QUANTITIES} == TRUTH_OBSERVABLES - everywhere
 
 
 def test_the_page_of_truths_is_made_of_them() -> None:
