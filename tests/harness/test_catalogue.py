@@ -14,7 +14,14 @@ import pytest
 from harness.data import scenes_root
 from harness.judging.judge import CaseJudge
 from harness.judging.results import Contender, Result, Results
-from harness.measure.observables import IMAGE_OBSERVABLES, TRUTH_OBSERVABLES, Observable
+from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
+    IMAGE_OBSERVABLES,
+    LIGHT_OBSERVABLES,
+    TRUTH_OBSERVABLES,
+    Observable,
+)
+from harness.measure.statistics import SUITE_CHECKS
 from harness.measure.truths import QUANTITIES, TRUTHS, Quantity, page
 from harness.plan import Form, PreparedCase, light_role, prepare, trace_role
 from harness.preflight import FLOAT32, FLOAT64, Preflight
@@ -179,3 +186,11 @@ def test_the_catalogue_is_as_large_as_it_says() -> None:
     assert len(cases) >= 80
     assert len({case.model.family for case in cases}) >= 18
     assert len(scene_files(scenes_root())) >= 40
+
+
+def test_the_level_of_a_suite_is_that_of_the_whole_catalogue() -> None:
+    """It allows for so many sampled checks; any of light or of a picture may be one."""
+    sampled = IMAGE_OBSERVABLES | LIGHT_OBSERVABLES | ALL_LIGHT_OBSERVABLES
+    cases = [case for path in scene_files(scenes_root()) for case in load_cases(path)]
+    checks = [check for case in cases for check in case.model.checks]
+    assert 0 < sum(Observable(check.observable) in sampled for check in checks) <= SUITE_CHECKS
