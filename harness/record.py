@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field
 
 from harness.documents import Model, read
 from harness.documents import write_bytes as write_bytes  # for those who write beside records
+from harness.documents import write_pieces as write_pieces
 from harness.documents import write_text as write_text
 from harness.outcomes import SEVERITY as SEVERITY
 from harness.outcomes import AgainstBaseline as AgainstBaseline

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 
 from harness.measure.observables import Observable
@@ -162,8 +162,12 @@ def elsewhere(renderer: str, checks: Iterable[Check]) -> str:
     return ", ".join(dict.fromkeys(clean(name) for names in off for name in names))
 
 
-def ranked(diagnoses: Sequence[Diagnosis], checks: Iterable[Check]) -> list[tuple[str, Diagnosis]]:
+def failing(checks: Iterable[Check]) -> set[str]:
+    """The renderers of which a check is bad."""
+    return {check.renderer for check in checks if check.status in BAD}
+
+
+def ranked(diagnoses: Sequence[Diagnosis], failing: Container[str]) -> list[tuple[str, Diagnosis]]:
     """Diagnoses with the verdict whose colour they bear: of renderers that fail before the rest."""
-    failing = {c.renderer for c in checks if c.status in BAD}
     toned = [("fail" if d.renderer in failing else "known", d) for d in diagnoses]
     return sorted(toned, key=lambda item: item[0] != "fail")

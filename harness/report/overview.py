@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
 
-from harness.record import Check, RendererSummary, Summary, Verdict
-from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view
+from harness.record import RendererSummary, Summary, Verdict
+from harness.report.checks import FIRST_TO_LOOK_AT, CheckView
+from harness.report.digest import Digest
 from harness.report.links import clean
 from harness.report.quantity import count, number
 from harness.report.view import Line
@@ -39,25 +40,13 @@ class Headline:
     worst_case: str = ""
 
 
-def headline(summary: Summary) -> Headline:
-    counts = dict.fromkeys(Verdict, 0)
-    worst: tuple[tuple[int, float], str, CheckView] | None = None
-    closest: tuple[float, str, CheckView] | None = None
-    for case in summary.cases:
-        for check in case.checks:
-            counts[check.status] += 1
-            view = check_view(check)
-            if check.status in BAD:
-                if worst is None or view.rank < worst[0]:
-                    worst = view.rank, case.id, view
-            elif check.status == Verdict.PASS and (ratio := view.ratio):
-                closest = (ratio, case.id, view) if not closest or ratio > closest[0] else closest
-    state, text = _sentence(summary, counts)
-    also = _also(summary, counts)
-    if worst:
-        return Headline(state, text, also, "Worst:", worst[2], worst[1])
-    if closest:
-        return Headline(state, text, also, "Closest to its limit:", closest[2], closest[1])
+def headline(summary: Summary, digest: Digest) -> Headline:
+    state, text = _sentence(summary, digest.counts)
+    also = _also(summary, digest.counts)
+    if worst := digest.worst:
+        return Headline(state, text, also, "Worst:", worst.view, worst.case)
+    if closest := digest.closest:
+        return Headline(state, text, also, "Closest to its limit:", closest.view, closest.case)
     return Headline(state, text, also)
 
 
@@ -74,38 +63,23 @@ class Failure:
     more: int
 
 
-def failures(summary: Summary) -> tuple[list[Failure], int]:
+def failures(digest: Digest) -> tuple[list[Failure], int]:
     """The worst check of each kind of failure, and how many kinds are left out.
 
     One fault of a renderer fails many checks: each of its observables that fail is one kind, and so
     is each reason for which it has no figures. Every renderer's first kind stands before any
     renderer's second, lest what fails most hide who fails at all.
     """
-    kinds: dict[tuple[str, str], list[tuple[tuple[int, float], str, CheckView]]] = {}
-    for case in summary.cases:
-        for check in case.checks:
-            if check.status in BAD:
-                view = check_view(check)
-                kind = check.observable if check.status is Verdict.FAIL else check.reason
-                kinds.setdefault((_who(check), kind), []).append((view.rank, case.id, view))
-    worst = [
-        (min(found, key=lambda f: f[0]), who, len(found) - 1) for (who, _), found in kinds.items()
-    ]
-    worst.sort(key=lambda item: item[0][0])
+    kinds = sorted(digest.kinds.items(), key=lambda item: item[1].worst.view.rank)
     turns: Counter[str] = Counter()
     in_turn: list[tuple[int, Failure]] = []
-    for (_, case_id, view), who, more in worst:
-        in_turn.append((turns[who], Failure(clean(case_id), view, clean(who), more)))
+    for (who, _), kind in kinds:
+        failure = Failure(clean(kind.worst.case), kind.worst.view, clean(who), kind.count - 1)
+        in_turn.append((turns[who], failure))
         turns[who] += 1
     in_turn.sort(key=lambda item: item[0])
     shown = [failure for _, failure in in_turn[:MOST_FAILURES]]
-    return shown, max(0, len(worst) - MOST_FAILURES)
-
-
-def _who(check: Check) -> str:
-    """Who is off where a check fails: of two that differ perhaps the other one."""
-    off = check.attribution.off if check.attribution else []
-    return check.renderer if check.renderer in off or not off else off[0]
+    return shown, max(0, len(kinds) - MOST_FAILURES)
 
 
 def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:
@@ -139,7 +113,7 @@ def _also(summary: Summary, counts: Mapping[Verdict, int]) -> list[str]:
             f"{count(counts[Verdict.KNOWN], 'known deviation')} at the size the scenes document"
         )
     stated = summary.counts.model_dump(by_alias=True)
-    if any(stated[verdict.value] != n for verdict, n in counts.items()):
+    if any(stated[verdict.value] != counts[verdict] for verdict in Verdict):
         notes.append("summary.json states other counts than its cases show")
     return notes
 
@@ -155,8 +129,7 @@ class Tally:
     shares: list[tuple[str, float, float]]
 
 
-def tally(summary: Summary) -> Tally:
-    counts = Counter(check.status for case in summary.cases for check in case.checks)
+def tally(counts: Mapping[Verdict, int]) -> Tally:
     everything = sum(counts.values())
     shares, start = [], 0.0
     for verdict in FIRST_TO_LOOK_AT:
@@ -222,16 +195,23 @@ class RendererLine:
 
 
 def renderer_lines(
-    summary: Summary, names: Sequence[str], rows: Sequence[Line]
+    summary: Summary, digest: Digest, names: Sequence[str], rows: Sequence[Line]
 ) -> list[RendererLine]:
-    return [_line(name, column, summary, rows) for column, name in enumerate(names)]
+    return [
+        _line(name, column, summary.renderers.get(name), digest.by_renderer.get(name), rows)
+        for column, name in enumerate(names)
+    ]
 
 
-def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> RendererLine:
-    known = summary.renderers.get(name)
+def _line(
+    name: str,
+    column: int,
+    known: RendererSummary | None,
+    counts: Counter[Verdict] | None,
+    rows: Sequence[Line],
+) -> RendererLine:
+    verdicts = counts or Counter()
     failed = sum(row.verdicts[column] is Verdict.ERROR for row in rows)
-    checks = [c for case in summary.cases for c in case.checks if c.renderer == name]
-    verdicts = Counter(check.status for check in checks)
     facts = known.facts if known else {}
     return RendererLine(
         name=name,
@@ -249,7 +229,7 @@ def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> Ren
         ],
         strip=_strip(rows, column),
         tally=", ".join(f"{n} {verdict.value}" for verdict, n in verdicts.items()),
-        checks=len(checks),
+        checks=verdicts.total(),
         passed=verdicts[Verdict.PASS] + verdicts[Verdict.KNOWN],
         render_s=known.render_s if known else 0.0,
     )

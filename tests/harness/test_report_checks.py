@@ -7,7 +7,8 @@ import pytest
 from harness.record import Attribution, Check, SummaryCase, Verdict
 from harness.report import overview
 from harness.report.checks import check_view, elsewhere, grouped, meaning, sorted_views, told
-from tests.harness.report_fixture import summary_of
+from harness.report.digest import Digest
+from harness.summary_file import Span
 
 
 def check(
@@ -96,8 +97,9 @@ def test_every_renderer_that_fails_is_among_the_first_failures() -> None:
     pair = check("tracer", observable="ssim", against="mytracer", off="mytracer")
     made = [*many, pair, *(crash(observable=name) for name in names)]
     case = SummaryCase(id="slab", family="slab", status=Verdict.ERROR, checks=made)
-    summary = summary_of([]).model_copy(update={"cases": [case]})
-    shown, left_out = overview.failures(summary)
+    digest = Digest()
+    digest.add(case, Span(0, 0))
+    shown, left_out = overview.failures(digest)
     assert [(f.off, f.more) for f in shown[:3]] == [
         ("mytracer", 0), ("crashing", 6), ("mytracer", 0),
     ]  # fmt: skip
