@@ -25,7 +25,7 @@ from harness.report.detection import detection
 from harness.report.differences import differences
 from harness.report.digest import Place, digest_of
 from harness.report.given import given_files
-from harness.report.links import RunFolder, clean, page_name, url
+from harness.report.links import RunFolder, breakable, clean, page_name, url
 from harness.report.pagedata import case_data
 from harness.report.spool import Spool
 from harness.report.trends import Trends
@@ -301,6 +301,7 @@ def environment() -> jinja2.Environment:
     )
     environment.filters.update(
         clean=clean,
+        breakable=breakable,
         number=quantity.number,
         seconds=quantity.seconds,
         count=quantity.count,

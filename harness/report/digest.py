@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from harness.record import Check, SummaryCase, Verdict
-from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view
+from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view, who_is_off
 from harness.summary_file import Span, SummaryFile
 
 Rank = tuple[int, float]
@@ -70,8 +70,8 @@ class Digest:
         return sorted(self.places, key=lambda place: place.rank)
 
     def failing(self) -> set[str]:
-        """The renderers of which a check is bad."""
-        return {name for name, counts in self.by_renderer.items() if any(counts[v] for v in BAD)}
+        """The renderers that are off where a check is bad."""
+        return {who for who, _ in self.kinds}
 
     def _failed(self, found: Found) -> None:
         if self.worst is None or found.view.rank < self.worst.view.rank:
@@ -102,7 +102,4 @@ def _rank(status: Verdict, views: list[CheckView]) -> Rank:
 
 
 def _kind(check: Check) -> tuple[str, str]:
-    """Who is off where a check fails, of two that differ perhaps the other one; and in what."""
-    off = check.attribution.off if check.attribution else []
-    who = check.renderer if check.renderer in off or not off else off[0]
-    return who, check.observable if check.status is Verdict.FAIL else check.reason
+    return who_is_off(check), check.observable if check.status is Verdict.FAIL else check.reason

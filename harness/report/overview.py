@@ -157,15 +157,20 @@ def started(summary: Summary) -> str:
 class Mark:
     """A case in a renderer's strip; what is wrong stands taller, so that colour is not needed.
 
-    In long strips a mark stands for `span` cases of one verdict, from the `start`th on.
+    In long strips a mark stands for `span` cases of one verdict, from the `start`th on. It is low
+    where the renderer fails only in comparison with another that is off.
     """
 
     status: Verdict | None
-    height: int
+    excused: bool
     start: int
     span: int
     title: str
     page: str | None
+
+    @property
+    def height(self) -> int:
+        return EXCUSED if self.excused else HEIGHTS[self.status]
 
 
 HEIGHTS = {
@@ -176,6 +181,7 @@ HEIGHTS = {
     Verdict.ERROR: 18,
     None: 1,
 }
+EXCUSED = 8
 
 
 @dataclass(frozen=True)
@@ -218,7 +224,7 @@ def _line(
         version=clean(known.version) if known else "",
         ok=known is not None and known.status == "ok" and not failed,
         state=_state(known, failed, sum(row.verdicts[column] is not None for row in rows)),
-        reason=clean(known.reason) if known else "",
+        reason=clean(_unless_repeated(known.reason, known.remedy)) if known else "",
         remedy=clean(known.remedy) if known else "",
         facts=[
             (
@@ -233,6 +239,11 @@ def _line(
         passed=verdicts[Verdict.PASS] + verdicts[Verdict.KNOWN],
         render_s=known.render_s if known else 0.0,
     )
+
+
+def _unless_repeated(reason: str, remedy: str) -> str:
+    """The reason without the command that stands below it anyway."""
+    return reason.removesuffix(remedy).rstrip(" :;") if remedy else reason
 
 
 def _state(known: RendererSummary | None, failed: int, asked: int) -> str:
@@ -251,18 +262,20 @@ def _strip(rows: Sequence[Line], column: int) -> list[Mark]:
     if len(rows) <= MOST_MARKS:
         return [_mark(row, column, k) for k, row in enumerate(rows)]
     found, start = [], 0
-    for status, group in groupby(row.verdicts[column] for row in rows):
+    for (status, excused), group in groupby((r.verdicts[column], r.excused[column]) for r in rows):
         span = len(list(group))
-        title = f"{count(span, 'case')}: {_word(status)}"
-        found.append(Mark(status, HEIGHTS[status], start, span, title, None))
+        title = f"{count(span, 'case')}: {_word(status, excused)}"
+        found.append(Mark(status, excused, start, span, title, None))
         start += span
     return found
 
 
 def _mark(row: Line, column: int, start: int) -> Mark:
-    status = row.verdicts[column]
-    return Mark(status, HEIGHTS[status], start, 1, f"{row.id}: {_word(status)}", row.page)
+    status, excused = row.verdicts[column], row.excused[column]
+    return Mark(status, excused, start, 1, f"{row.id}: {_word(status, excused)}", row.page)
 
 
-def _word(status: Verdict | None) -> str:
-    return status.value if status else "took no part"
+def _word(status: Verdict | None, excused: bool) -> str:
+    if excused:
+        return f"{status}, but another is off"
+    return status.value if status else "no checks of its own"

@@ -135,12 +135,14 @@ class Line:
     page: str | None
     change: Change | None
     verdicts: tuple[Verdict | None, ...]
+    excused: tuple[bool, ...]  # of each renderer, whether only others are off where it fails
     html: Piece
 
 
 def line(row: Row, html: Piece) -> Line:
     verdicts = tuple(cell.status for cell in row.cells)
-    return Line(row.id, row.family, row.status, row.page, row.change, verdicts, html)
+    excused = tuple(bool(cell.elsewhere) for cell in row.cells)
+    return Line(row.id, row.family, row.status, row.page, row.change, verdicts, excused, html)
 
 
 def split_id(case_id: str) -> tuple[str, list[tuple[str, str]]]:
