@@ -27,6 +27,7 @@ from harness.renderers.base import Image, RayPaths, RenderSettings
 from harness.scene.fingerprint import fingerprint
 
 LOG_LINES = 40
+ENDINGS = (".json", ".js", ".baseline.js")  # records and scenes, a case's pictures, approved ones
 PLATFORM = f"{platform.system()} {platform.machine()}"
 # The range of all difference maps, logarithmic, the same for all renderers and cases, and that of
 # the page's own maps: rounding in single precision is dark, what an eye could see is bright.
@@ -42,13 +43,15 @@ def folder_name(case_id: str) -> str:
 def belongs(path: str, name: str) -> bool:
     """Whether a path relative to a run's folder is of the case whose `folder_name` is `name`.
 
-    All that is written for a case is ``FOLDER/NAME.…`` or ``FOLDER/NAME/…``; the report's pages in
-    ``cases/`` are made anew from that.
+    All that is written for a case is ``FOLDER/NAME`` with one of `ENDINGS`, or ``FOLDER/NAME/…``;
+    the report's pages in ``cases/`` are made anew from that.
     """
     parts = PurePosixPath(path).parts
     if len(parts) < 2 or parts[0] in ("/", "cases") or ".." in parts:
         return False
-    return parts[1].startswith(f"{name}.") if len(parts) == 2 else parts[1] == name
+    if len(parts) > 2:
+        return parts[1] == name
+    return parts[1] in {f"{name}{ending}" for ending in ENDINGS}
 
 
 class Archive:
@@ -139,7 +142,11 @@ class Archive:
 
     def files(self, name: str) -> list[str]:
         """The paths of all that belongs to a case, its record last, relative to the folder."""
-        found = [*self.root.glob(f"*/{name}.*"), *self.root.glob(f"*/{name}/**/*")]
+        # Asked for each case, so nothing is listed that grows with their number.
+        found = []
+        for folder in self.root.glob("*"):
+            found += [folder / f"{name}{ending}" for ending in ENDINGS]
+            found += (folder / name).rglob("*")
         paths = [path.relative_to(self.root).as_posix() for path in found if path.is_file()]
         mine = [path for path in paths if belongs(path, name)]
         return sorted(mine, key=lambda path: (path.startswith("records/"), path))

@@ -60,8 +60,12 @@ class Problem:
         place = str(self.file) if self.file else "<input>"
         if self.line is not None:
             place += f":{self.line}"
-        text = f"{place}: {shown(self.key)}: " if self.key else f"{place}: "
-        text += self.message
+        return f"{place}: {self.said}"
+
+    @property
+    def said(self) -> str:
+        """The message without the file, for where that is told beside it."""
+        text = f"{shown(self.key)}: {self.message}" if self.key else self.message
         # What is quoted here came from outside.
         if self.value is not None:
             text += f"; got {shown(self.value)}"

@@ -80,7 +80,10 @@ class LostCheck(Model):
 
 
 class Trend(Model):
-    """A check that moves in one direction from run to run; `slope` is in tolerances per run."""
+    """A check that moves in one direction over `runs` runs; `slope` is in tolerances per run.
+
+    Runs that repeat the one before them do not count.
+    """
 
     case: str
     check: str
@@ -91,10 +94,14 @@ class Trend(Model):
 
 
 class BaselineSummary(Model):
-    """The outcome of `snellcheck check`: against what, how many in which state, what is lost."""
+    """The outcome of `snellcheck check`: against what, how many in which state, what is lost.
+
+    `runs` is how many runs `trends` were looked for in, this one among them.
+    """
 
     source: str
     failed: bool
     counts: dict[str, int]
     lost: list[LostCheck] = Field(default_factory=list)
     trends: list[Trend] = Field(default_factory=list)
+    runs: int = 1

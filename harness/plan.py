@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from harness.measure.furnace import is_furnace
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
@@ -95,7 +96,7 @@ class PreparedCase:
         """Of its spectrum, in nm; empty where it has none."""
         return tuple(wavelength for wavelength, _ in self.passes)
 
-    @property
+    @cached_property
     def forms(self) -> tuple[Form, ...]:
         """The case itself and its variants."""
         probes = self.loaded.model.probes
@@ -138,7 +139,7 @@ class PreparedCase:
 
     def planes(self, probe: model.Probe) -> tuple[Rectangle, ...]:
         """The rectangles on which the probe's rays are caught."""
-        return probe_planes(probe)
+        return self.forms[0].planes[probe.name]
 
 
 def prepare(loaded: LoadedCase) -> PreparedCase:

@@ -289,7 +289,8 @@ class Effort(Model):
     `retried` counts repetitions after failures that were not the renderer's (a lost machine, a
     process that could not be started), `damaged` entries of the cache that were made again.
     Processor time, user and system, went into `renderers_cpu_s`, the processes that renderers ran
-    in on this machine, and into `own_cpu_s`, all the rest of the run.
+    in on this machine, and into `own_cpu_s`, all the rest of the run. `memory_mb` is the most that
+    all of them took at a time, in MiB (see `harness.running.memory`).
     """
 
     rendered: int = 0
@@ -298,6 +299,7 @@ class Effort(Model):
     damaged: int = 0
     own_cpu_s: float = 0.0
     renderers_cpu_s: float = 0.0
+    memory_mb: float = 0.0
 
 
 class SummaryCase(Model):

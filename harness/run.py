@@ -20,7 +20,7 @@ from harness.plan import PreparedCase
 from harness.record import Counts, RendererSummary, Summary, SummaryCase, Verdict
 from harness.renderers.base import Renderer, RenderSettings
 from harness.renderers.confinement import described
-from harness.running import lanes
+from harness.running import lanes, memory
 from harness.running.remote import RemoteRenderer
 from harness.running.session import Progress, Session, Storage
 from harness.running.shard import write_times
@@ -81,16 +81,17 @@ def run(
         )
         interrupted, spent = False, _processor_time()
         (out / "summary.json").unlink(missing_ok=True)  # an old one would belie what is there now
-        try:
-            session.work()
-        except KeyboardInterrupt:
-            interrupted = True
-            session.give_up("the run was interrupted before this was judged")
-        finally:
-            session.close()
+        with memory.watched() as peak:
+            try:
+                session.work()
+            except KeyboardInterrupt:
+                interrupted = True
+                session.give_up("the run was interrupted before this was judged")
+            finally:
+                session.close()
         own, theirs = (b - a for a, b in zip(spent, _processor_time(), strict=True))
         session.effort = session.effort.model_copy(
-            update={"own_cpu_s": own, "renderers_cpu_s": theirs}
+            update={"own_cpu_s": own, "renderers_cpu_s": theirs, "memory_mb": peak.mb}
         )
         summary = _summary(session, command, must_run, interrupted)
         write_times(out, session.records)

@@ -107,6 +107,8 @@ def _effort(summary: Summary, console: Console) -> None:
     if effort.renderers_cpu_s:
         share = effort.renderers_cpu_s / cpu
         parts.append(f"{cpu:.0f} s of processor time, {share:.0%} of it in renderers")
+    if effort.memory_mb:
+        parts.append(f"{size(int(effort.memory_mb * 2**20))} of memory at most")
     console.print(", ".join(parts))
     if summary.interrupted:
         console.print("[bold]Interrupted:[/] the same command goes on where this run stood.")

@@ -175,7 +175,8 @@ def _figures(check: Check | None) -> str:
     if check is None or check.value is None or check.expected is None:
         return "nothing"
     off = check.value - check.expected
-    return f"{check.status.value}, off by {off:.3g} {check.unit} of {check.tolerance:.3g}"
+    sizes = f"off by {off:.3g} of {check.tolerance:.3g} {check.unit}"
+    return f"{check.status.value}, {sizes}".rstrip()
 
 
 def approve(

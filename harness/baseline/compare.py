@@ -14,6 +14,7 @@ from harness.baseline.document import Baseline, Kept, identity
 from harness.baseline.means import mean_shift
 from harness.baseline.run_folder import RunFolder, checks_of
 from harness.baseline.source import Baselines
+from harness.baseline.trend import in_tolerances
 from harness.record import (
     AgainstBaseline,
     BaselineState,
@@ -69,7 +70,7 @@ def compare(run: RunFolder, baselines: Baselines, wanted: Wanted) -> Comparison:
     for problem in baselines.unreadable:
         result.lost.append(
             LostCheck(case=str(problem.file), renderer="", state=BaselineState.MISSING,
-                      reason=str(problem))
+                      reason=problem.said)
         )  # fmt: skip
     return result
 
@@ -156,10 +157,10 @@ def _new(check: Check) -> tuple[BaselineState, str]:
 
 
 def _deviation(check: Check) -> float:
-    """(value - expected) in tolerances; where the tolerance is 0, in the unit of the value."""
+    """The check's deviation in tolerances. Raises ValueError where it was not measured."""
     if check.value is None or check.expected is None or check.tolerance is None:
         raise ValueError(f"{check.id} was not measured")
-    return (check.value - check.expected) / (check.tolerance or 1.0)
+    return in_tolerances(check.value, check.expected, check.tolerance)
 
 
 def _moved(check: Check, approved: Check, shift: float) -> tuple[BaselineState, str]:

@@ -10,8 +10,13 @@ from harness.baseline.run_folder import RunFolder, record_file
 from harness.record import BaselineState, BaselineSummary, Check, Summary, Trend
 
 
-def outcome(comparison: Comparison, source: str, trends: Sequence[Trend]) -> BaselineSummary:
-    """Fails for what regressed, is missing or stale, and where nothing was compared at all."""
+def outcome(
+    comparison: Comparison, source: str, trends: Sequence[Trend], runs: int = 1
+) -> BaselineSummary:
+    """Fails for what regressed, is missing or stale, and where nothing was compared at all.
+
+    `trends` were found in `runs` runs.
+    """
     counts = comparison.counts()
     compared = sum(counts.values()) - counts[BaselineState.NEW]
     return BaselineSummary(
@@ -20,6 +25,7 @@ def outcome(comparison: Comparison, source: str, trends: Sequence[Trend]) -> Bas
         counts={state.value: counts[state] for state in BaselineState if counts[state]},
         lost=comparison.lost,
         trends=list(trends),
+        runs=runs,
     )
 
 

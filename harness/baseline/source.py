@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from harness.baseline.document import LARGEST_BASELINE, Baseline, Kept, StoredImage, parse_baseline
+from harness.baseline.document import LARGEST_BASELINE, Kept, StoredImage, parse_baseline
 from harness.baseline.pictures import restore
 from harness.baseline.run_folder import baselines_of_run
 from harness.baseline.store import LARGEST_PICTURE, Store
@@ -19,12 +19,17 @@ FOLDER = "references"  # where baselines lie in a repository
 
 @dataclass
 class Baselines:
-    """All baselines of one source by (case, renderer), and what of it could not be read."""
+    """All baselines of one source by (case, renderer), and what of it could not be read.
+
+    Large pictures come from `store` by their hash. A baseline names the store that it was approved
+    into, and is not followed there: it may be anybody's, and a URL can lead anywhere.
+    """
 
     source: str
     kept: dict[tuple[str, str], Kept] = field(default_factory=dict)
     unreadable: list[Problem] = field(default_factory=list)
     revision: str = ""
+    store: Store | None = None
 
     def add(self, data: bytes, file: Path) -> None:
         """Takes in the baseline `data` from `file`; what is wrong with it is remembered."""
@@ -42,27 +47,35 @@ class Baselines:
         file = kept.file.with_name(image.file) if image.file else kept.file
         if image.file:
             data = _blob(self.revision, file) if self.revision else _bytes(file)
-        elif image.store:
-            data = Store(image.store).get(image.sha256)
-        else:
+        elif not image.store:
             raise InputError.of(f"the picture '{image.role}' was not kept", file=file)
+        elif self.store is None:
+            raise InputError.of(
+                f"the picture '{image.role}' is in a store", file=file, value=image.store,
+                expected="--store or SNELLCHECK_STORE to name the store to look in",
+            )  # fmt: skip
+        else:
+            data = self.store.get(image.sha256)
         return restore(image, data, file)
 
 
-def open_baselines(where: str) -> Baselines:
+def open_baselines(where: str, store: Store | None = None) -> Baselines:
     """The baselines that `where` names: a folder, a run's folder, or a revision of git.
 
-    Raises InputError where it is none of these. Single files that cannot be read are in
-    `unreadable`.
+    Pictures that are not beside them come from `store`, and from nowhere else. Raises InputError
+    where it is none of these. Single files that cannot be read are in `unreadable`.
     """
     path = Path(where)
     if (path / "summary.json").is_file():
-        return _of_run(path)
-    if path.is_dir():
-        return _of_folder(path)
-    if path.exists():
+        found = _of_run(path)
+    elif path.is_dir():
+        found = _of_folder(path)
+    elif path.exists():
         raise InputError.of("not a folder of baselines or of a run", file=path)
-    return _of_revision(where)
+    else:
+        found = _of_revision(where)
+    found.store = store
+    return found
 
 
 def _of_folder(folder: Path) -> Baselines:
@@ -131,9 +144,3 @@ def _bytes(file: Path, most: int = LARGEST_PICTURE) -> bytes:
     if len(data) > most:
         raise InputError.of(f"larger than {most} bytes", file=file)
     return data
-
-
-def find(baselines: Baselines, case: str, renderer: str) -> Baseline | None:
-    """The approved results of `renderer` for `case`."""
-    kept = baselines.kept.get((case, renderer))
-    return kept.baseline if kept else None

@@ -6,8 +6,9 @@ What was stored for another scene or with other settings is refused, case by cas
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 from harness import plan
 from harness.baseline.document import Baseline, Kept
@@ -24,14 +25,17 @@ Stood = tuple[Contender, Mapping[str, Image]]  # images by role
 
 
 class StandIns:
-    """Looks a missing renderer's results up, in the first of `sources` that has the case."""
+    """Looks a missing renderer's results up, in the first source that has the case.
 
-    def __init__(self, sources: Sequence[Baselines], quality: str) -> None:
-        self._sources, self._quality = sources, quality
+    `sources` are hundreds of files, read once a renderer turns out to be missing and not before.
+    """
 
-    def has(self, renderer: str) -> bool:
-        """Whether anything at all is stored of `renderer`."""
-        return any(name == renderer for source in self._sources for _, name in source.kept)
+    def __init__(self, sources: Callable[[], Sequence[Baselines]], quality: str) -> None:
+        self._read, self._quality = sources, quality
+
+    @cached_property
+    def _sources(self) -> Sequence[Baselines]:
+        return self._read()
 
     def stand_in(self, missing: Contender, case: PreparedCase, settings: RenderSettings) -> Stood:
         """`missing` with what is stored for `case`; itself, with the reason, where that is no use.

@@ -63,6 +63,11 @@ class Store:
             raise InputError.of(message, key="--store", value=self.url) from error
 
 
+def store_at(where: str) -> Store | None:
+    """The store in a folder or at a URL; none where nothing was named."""
+    return Store(where) if where else None
+
+
 def _name(digest: str) -> str:
     if len(digest) != 64 or set(digest) - set("0123456789abcdef"):
         raise InputError.of("not a SHA-256", value=digest[:80])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import click
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -14,7 +15,10 @@ from harness.record import BaselineState, Summary
 
 if TYPE_CHECKING:
     from harness.baseline.approve import Plan
+    from harness.baseline.run_folder import RunFolder
     from harness.baseline.source import Baselines
+    from harness.baseline.stand_in import StandIns
+    from harness.baseline.trend import Deviations
 
 MOST_LINES = 40
 STYLE = {
@@ -32,18 +36,43 @@ def default_baseline() -> str:
     return str(BASELINES if BASELINES.is_dir() else references_root())
 
 
-def stand_in_sources() -> list[Baselines]:
-    """Where results of missing renderers are looked for: here first, then what came along."""
+def stand_ins(store: str, quality: str) -> StandIns:
+    """What stands in for missing renderers: looked for here first, then in what came along.
+
+    Large pictures are looked for in `store`, a folder or a URL.
+    """
     from harness.baseline.source import open_baselines
+    from harness.baseline.stand_in import StandIns
+    from harness.baseline.store import store_at
     from harness.data import references_root
 
-    folders = dict.fromkeys(f.resolve() for f in (BASELINES, references_root()) if f.is_dir())
-    return [open_baselines(str(folder)) for folder in folders]
+    def sources() -> list[Baselines]:
+        folders = dict.fromkeys(f.resolve() for f in (BASELINES, references_root()) if f.is_dir())
+        return [open_baselines(str(folder), store_at(store)) for folder in folders]
+
+    return StandIns(sources, quality)
+
+
+def past_runs(run: RunFolder) -> list[Deviations]:
+    """The runs into the folder of `run` before it, oldest first, as the history has them.
+
+    None where there is no history, or where it cannot be read, which is told: it is a convenience.
+    """
+    from harness.errors import InputError
+    from harness.history.store import History, history_file
+
+    history = History(history_file())
+    try:
+        return history.before(run.summary, run.folder) if history.file.is_file() else []
+    except InputError as error:
+        click.secho(f"warning: {error}; slow slides are not looked for", fg="yellow", err=True)
+        return []
 
 
 def show_states(summary: Summary, console: Console | None = None) -> None:
     """Counts by state, then every check that is not as approved, the worst first."""
     from harness.baseline.compare import WORST_FIRST
+    from harness.baseline.trend import SHORTEST
 
     console = console or Console()
     found = summary.baseline
@@ -72,6 +101,10 @@ def show_states(summary: Summary, console: Console | None = None) -> None:
             f"[yellow]drifting[/] {escape(trend.case)} {escape(trend.check)}: "
             f"{escape(trend.reason)} (p = {trend.p_value:.1g})",
             soft_wrap=True,
+        )
+    if found.runs < SHORTEST:
+        console.print(
+            f"Slow slides can be seen once there are {SHORTEST} runs; there are {found.runs}"
         )
     if new:
         console.print(f"{len(new)} checks were never approved; `snellcheck approve` does that")

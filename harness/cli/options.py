@@ -44,6 +44,11 @@ cache_option = click.option(
     help="Where results are kept from run to run.  [default: the user's cache folder]",
 )  # fmt: skip
 
+store_option = click.option(
+    "--store", metavar="DIR|URL", default="", envvar="SNELLCHECK_STORE",
+    help="Where approved pictures are that are too large for git.",
+)  # fmt: skip
+
 history_option = click.option(
     "--history/--no-history", "history", default=True, show_default=True,
     help="Add the figures to the history of past runs.",

@@ -14,10 +14,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from harness.baseline.document import MEASURED
+from harness.baseline.trend import Deviations, in_tolerances
 from harness.errors import InputError, utf8
 from harness.history.revision import Revision
 from harness.record import Summary
 
+MOST_BEFORE = 100  # runs in which slides are looked for; many repeat the one before
 MOST_RUNS = 2000  # a run of 500 checks takes some 50 KB
 BUSY_S = 30.0  # two runs may end at the same time
 SCHEMA = """
@@ -34,6 +37,7 @@ CREATE TABLE IF NOT EXISTS checks (
     status TEXT, reason TEXT
 );
 CREATE INDEX IF NOT EXISTS checks_of_case ON checks (case_id, run);
+CREATE INDEX IF NOT EXISTS checks_of_run ON checks (run);
 CREATE INDEX IF NOT EXISTS renderers_of_run ON renderers (run);
 """
 
@@ -143,6 +147,31 @@ class History:
         found = [dict(zip(names, row, strict=True)) for row in rows]
         return [Point(**{**one, "dirty": bool(one["dirty"])}) for one in found]
 
+    def before(self, run: Summary, folder: Path) -> list[Deviations]:
+        """The deviations of the runs into `folder` before `run`, of its quality, oldest first.
+
+        In the order in which they were added, whatever the machine's clock said. Raises InputError.
+        """
+        measured = ", ".join(f"'{status.value}'" for status in MEASURED)
+        with self._reading() as db:
+            runs = db.execute(
+                "SELECT id FROM runs WHERE folder = ? AND quality = ? AND started != ? "
+                "ORDER BY id DESC LIMIT ?",
+                (_place(folder), run.quality, run.started, MOST_BEFORE),
+            ).fetchall()
+            rows = [
+                db.execute(
+                    "SELECT case_id, check_id, value, expected, tolerance FROM checks WHERE run = ?"
+                    f" AND status IN ({measured}) AND value IS NOT NULL AND expected IS NOT NULL "
+                    "AND tolerance IS NOT NULL", number,
+                ).fetchall()
+                for number in reversed(runs)
+            ]  # fmt: skip
+        return [
+            {(case, check): in_tolerances(*figures) for case, check, *figures in one}
+            for one in rows
+        ]
+
     def cases(self) -> list[str]:
         """All cases of which anything is known. Raises InputError."""
         with self._reading() as db:
@@ -179,7 +208,7 @@ class History:
             "INSERT INTO runs (started, commit_id, dirty, folder, quality, snellcheck, exit_code, "
             "wall_s) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
             (
-                summary.started, revision.commit, revision.dirty, utf8(str(folder.resolve())),
+                summary.started, revision.commit, revision.dirty, _place(folder),
                 summary.quality, summary.snellcheck_version, summary.exit_code, summary.wall_s,
             ),
         )  # fmt: skip
@@ -209,3 +238,8 @@ class History:
         with self._open() as db:
             self._insert(db, summary, revision, folder)
         return f"{self.file} was damaged ({error}); it is {aside} now, and a new history begins"
+
+
+def _place(folder: Path) -> str:
+    """A run's folder as the history names it."""
+    return utf8(str(folder.resolve()))

@@ -13,7 +13,7 @@ from harness import expected
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import nature, worst_level
-from harness.measure.pixel_areas import pixel_areas
+from harness.measure.pixel_areas import Grid, pixel_areas
 from harness.measure.precision import Precision
 from harness.measure.probe_truth import STEP, ProbeTruth
 from harness.measure.statistics import Noise, binned
@@ -46,9 +46,13 @@ def sampled_path_weight(
     """The same for a renderer that samples lobes and pixels: means over bins of like angle."""
     _, used = expected_level(truth, n2)
     areas = pixel_areas(truth)
-    level = areas.paths.weight[:, None] * areas.landing.transmission
-    level = np.nan_to_num(level) * _brightening(truth.scene, areas.paths, n2)[:, None]
-    true = areas.mean(np.where((areas.landing.status == Status.HIT)[:, None], level, 0.0))
+
+    def light(grid: Grid) -> Float:
+        level = grid.paths.weight[:, None] * grid.landing.transmission
+        level = np.nan_to_num(level) * _brightening(truth.scene, grid.paths, n2)[:, None]
+        return np.where((grid.landing.status == Status.HIT)[:, None], level, 0.0)
+
+    true = areas.mean(light)
     used = used & areas.whole
     if not used.any():
         raise Unmeasurable("every pixel of this path holds an edge")

@@ -5,7 +5,9 @@ Near total reflection light changes so fast that the mean over a pixel is not wh
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,45 +16,98 @@ from harness.expected import Float
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.rays import RayMeasurement
 from harness.renderers.base import Rays, Status
-from harness.scene.resolved import Film
-from harness.truth.camera import primary_rays
+from harness.truth.camera import rays_through
 from harness.truth.paths import ClosedForm, Landing, TruePaths
 
-# Rays a side of a pixel. The midpoint rule then misses a sixteenth of what the centre alone does.
-FINER = 4
+# Where rays go through a pixel along either side, from 0 to 1, and what share each of them has.
+# Gauss's and Legendre's rule of three is exact for polynomials of the fifth degree. It knows
+# nothing of the root with which light goes out where total reflection begins: there, the midpoints
+# of eight.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+SMOOTH = (0.5 + _NODES / 2, _WEIGHTS / 2)
+ROOTED = ((np.arange(8) + 0.5) / 8, np.full(8, 1 / 8))
+# How much farther from the centre a pixel's border is than the outermost of three.
+TO_BORDER = float(0.5 / (SMOOTH[0].max() - 0.5))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The probe's path followed by as many rays in each of the pixels `rows` (k,) as there are
+    `shares`; those of one pixel stand together.
+    """
+
+    rows: NDArray[np.intp]
+    rays: Rays
+    paths: TruePaths
+    landing: Landing
+    shares: Float
+
+    def by_pixel(self, values: NDArray[Any]) -> NDArray[Any]:
+        """(k, shares, …) of `values`, which have one for each ray."""
+        return values.reshape(len(self.rows), len(self.shares), *values.shape[1:])
 
 
 @dataclass(frozen=True)
 class PixelAreas:
-    """The probe's path followed by `FINER` squared rays in each of the m pixels.
+    """`all_of_them` has rays in each of the m pixels, `rooted` more where total reflection begins.
 
     `whole` (m,) are pixels of which all rays end alike: none lands beside the plane or goes another
     way while others land on it. Total reflection is no other way: light fades into it.
     """
 
-    rays: Rays
-    paths: TruePaths
-    landing: Landing
+    all_of_them: Grid
+    rooted: Grid
     whole: NDArray[np.bool_]
-    film: Film
 
-    def mean(self, values: Float) -> Float:
-        """(m, 3) means over pixels of `values`, one (3,) for each ray."""
-        film = self.film
-        blocks = values.reshape(film.height, FINER, film.width, FINER, 3)
-        return np.asarray(blocks.mean(axis=(1, 3)).reshape(-1, 3))
+    def mean(self, light: Callable[[Grid], Float]) -> Float:
+        """(m, 3) means over pixels of `light`, which tells (3,) of each of a grid's rays."""
+        means = np.empty((len(self.whole), 3))
+        for grid in (self.all_of_them, self.rooted):
+            if len(grid.rows):
+                blocks = grid.by_pixel(light(grid))
+                means[grid.rows] = np.einsum("ksc,s->kc", blocks, grid.shares)
+        return means
 
 
 def pixel_areas(truth: ProbeTruth) -> PixelAreas:
     """Of the truth's own film."""
-    film, form = truth.scene.film, ClosedForm(truth.scene)
-    finer = Film(width=film.width * FINER, height=film.height * FINER)
-    rays = primary_rays(truth.scene.model_copy(update={"film": finer}))
+    m = len(truth.grazing)
+    all_of_them = _grid(truth, np.arange(m), SMOOTH)
+    rooted = _grid(truth, np.flatnonzero(_begins_total_reflection(truth, all_of_them)), ROOTED)
+    whole = np.empty(m, bool)
+    for grid in (all_of_them, rooted):
+        other = (grid.landing.status != Status.HIT) & (grid.paths.status != Status.TIR)
+        alike = grid.by_pixel(other)
+        whole[grid.rows] = alike.all(axis=1) | ~alike.any(axis=1)
+    return PixelAreas(all_of_them, rooted, whole)
+
+
+def _grid(truth: ProbeTruth, rows: NDArray[np.intp], rule: tuple[Float, Float]) -> Grid:
+    places, shares = rule
+    form, width = ClosedForm(truth.scene), truth.scene.film.width
+    down, across = (
+        (corner[:, None] + inside.ravel()).ravel()
+        for corner, inside in zip(
+            np.divmod(rows, width), np.meshgrid(places, places, indexing="ij"), strict=True
+        )
+    )
+    rays = rays_through(truth.scene, across, down)
     paths = form.follow(rays, truth.path)
     landing = form.land(paths, truth.planes[0])
-    other = (landing.status != Status.HIT) & (paths.status != Status.TIR)
-    share = other.reshape(film.height, FINER, film.width, FINER).mean(axis=(1, 3)).ravel()
-    return PixelAreas(rays, paths, landing, (share == 0) | (share == 1), film)
+    return Grid(rows, rays, paths, landing, np.outer(shares, shares).ravel())
+
+
+def _begins_total_reflection(truth: ProbeTruth, grid: Grid) -> NDArray[np.bool_]:
+    """(m,) pixels of which, or of whose neighbours, some rays are totally reflected and some not.
+
+    A neighbour's count, since the limit may lie between a pixel's border and its outermost ray.
+    """
+    from scipy.ndimage import maximum_filter
+
+    film = truth.scene.film
+    total = np.any(grid.by_pixel(grid.paths.total), axis=-1).reshape(film.height, film.width, -1)
+    some, others = (maximum_filter(mask.any(axis=-1), 3) for mask in (total, ~total))
+    return np.asarray((some & others).ravel())
 
 
 def over_areas(rays: RayMeasurement, truth: ProbeTruth) -> RayMeasurement:
@@ -61,8 +116,7 @@ def over_areas(rays: RayMeasurement, truth: ProbeTruth) -> RayMeasurement:
     The mean of a pixel is somewhere in what its corners enclose, so it is uncertain by how far the
     farthest of them is. Where not all of a pixel's rays end alike, it tells nothing.
     """
-    areas, form, film = pixel_areas(truth), ClosedForm(truth.scene), truth.scene.film
-    shape, one = (film.height, FINER, film.width, FINER), (film.height, 1, film.width, 1)
+    areas, form = _grid(truth, np.arange(len(rays.seen)), SMOOTH), ClosedForm(truth.scene)
     alike = np.ones(len(rays.seen), bool)
     reach = []
     for plane, centre in zip(truth.planes, truth.landings, strict=True):
@@ -71,11 +125,9 @@ def over_areas(rays: RayMeasurement, truth: ProbeTruth) -> RayMeasurement:
             (landing.status, centre.status),
             (areas.paths.status, truth.paths.status),
         ):
-            alike &= (fine.reshape(shape) == own.reshape(one)).all(axis=(1, 3)).ravel()
-        aside = landing.point.reshape(*shape, 3) - centre.point.reshape(*one, 3)
-        farthest = np.linalg.norm(aside, axis=-1).max(axis=(1, 3)).ravel()
-        # The outermost rays are half of their distance from a pixel's border.
-        reach.append(np.nan_to_num(farthest) * FINER / (FINER - 1))
+            alike &= (areas.by_pixel(fine) == own[:, None]).all(axis=1)
+        aside = areas.by_pixel(landing.point) - centre.point[:, None]
+        reach.append(np.nan_to_num(np.linalg.norm(aside, axis=-1).max(axis=1)) * TO_BORDER)
     direction_uncertainty = rays.direction_uncertainty
     if len(reach) == 2:
         way = np.linalg.norm(truth.landings[1].point - truth.landings[0].point, axis=1)

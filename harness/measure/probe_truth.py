@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float
+from harness.expected import Float, lengths
 from harness.measure.precision import Precision
 from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
@@ -76,40 +76,41 @@ class ProbeTruth:
     direction: Condition
     weight: Condition
 
-    @cached_property
+    @property
     def ambiguous(self) -> NDArray[np.bool_]:
         """(m,) rays of which another part lands on a plane too, by a path no longer than this one.
 
         Only a renderer that cannot switch lobes off shows it, and then both codes mix: near the rim
         of a ball, for one, what is reflected goes on to the backdrop behind it.
         """
-        return self._elsewhere(partial=True)
+        return self._elsewhere[0]
 
-    @cached_property
+    @property
     def ambiguous_when_total(self) -> NDArray[np.bool_]:
         """(m,) the same where a renderer reflects nothing but what is totally reflected."""
-        return self._elsewhere(partial=False)
+        return self._elsewhere[1]
 
     @cached_property
     def total(self) -> NDArray[np.bool_]:
         """(m,) rays that are totally reflected wherever their path says R."""
-        total = np.zeros(len(self.grazing), bool)
-        for branch in branches(
-            ClosedForm(self.scene), self.rays, len(self.path) + 1, along=self.path, partial=False
-        ):
-            if branch.path == self.path:
-                total[branch.rows] = True
-        return total
+        reflects = np.array([letter == "R" for letter in self.path])
+        arrives = self.paths.status == Status.HIT
+        return np.asarray(arrives & self.paths.total[:, reflects].all(axis=1))
 
-    def _elsewhere(self, partial: bool) -> NDArray[np.bool_]:
-        exact, found = ClosedForm(self.scene), np.zeros(len(self.grazing), bool)
-        for branch in branches(exact, self.rays, len(self.path) + 1, partial=partial):
+    @cached_property
+    def _elsewhere(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(m,) rays of which another path lands on a plane, and that by total reflections alone."""
+        exact, m = ClosedForm(self.scene), len(self.grazing)
+        by_any, by_total = np.zeros(m, bool), np.zeros(m, bool)
+        for branch in branches(exact, self.rays, len(self.path) + 1):
             if branch.path != self.path:
                 way = (branch.origin, branch.direction, branch.ahead)
                 for plane in self.planes:
                     landing = exact.meet(plane, *way, branch.medium, branch.absorbed)
-                    found[branch.rows] |= landing.status == Status.HIT
-        return found
+                    landed = landing.status == Status.HIT
+                    by_any[branch.rows] |= landed
+                    by_total[branch.rows] |= landed & branch.certain
+        return by_any, by_total
 
     def conditions(self, used: NDArray[np.bool_]) -> dict[str, float | int | str]:
         """Condition numbers of the rays `used`, at worst: by a relative change of all indices.
@@ -136,7 +137,8 @@ class ProbeTruth:
     @cached_property
     def all_light_n2(self) -> AllLight:
         """The same where radiance scales with the square of the index."""
-        return self.all_light_of(self.rays, n2=True)
+        plain = self.all_light
+        return self.all_light_of(self.rays, n2=True) if plain.abroad else plain
 
     def all_light_of(self, rays: Rays, n2: bool, natural: bool = True) -> AllLight:
         """The same of other rays of the camera."""
@@ -293,13 +295,13 @@ def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays, float]]:
     d = rays.directions
     helper = np.where((np.abs(d[:, :1]) < 0.6), [[1.0, 0, 0]], [[0, 1.0, 0]])
     e1 = np.cross(d, helper)
-    e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
+    e1 /= lengths(e1)[:, None]
     e2 = np.cross(d, e1)
     out = []
     for e in (e1, e2):
         out.append(("origin", Rays(rays.origins + step * e, d), step))
         tilted = d - STEP * e
-        tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
+        tilted /= lengths(tilted)[:, None]
         out.append(("direction", Rays(rays.origins, tilted), STEP))
     return out
 
@@ -313,5 +315,5 @@ def _fate_differs(a: TruePaths, b: TruePaths) -> NDArray[np.bool_]:
 
 def _rate(a: Float, b: Float, step: float) -> Float:
     """Length of (b - a) / step; 0 where either is missing."""
-    change = np.linalg.norm(b - a, axis=1) / step
+    change = lengths(b - a) / step
     return np.asarray(np.where(np.isfinite(change), change, 0.0))

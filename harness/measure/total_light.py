@@ -48,7 +48,7 @@ def all_light(
     }
     if noise is not None:
         areas = pixel_areas(truth)
-        true = areas.mean(truth.all_light_of(areas.rays, n2, natural=False).level)
+        true = areas.mean(lambda grid: truth.all_light_of(grid.rays, n2, natural=False).level)
         rows = np.flatnonzero(used & areas.whole)
         order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
         comparison = binned(measured, true, order, noise)

@@ -41,7 +41,7 @@ class Watch:
     def _look(self) -> str:
         if self.tree.resident_mb() > self.memory_mb:
             return f"used more than {self.memory_mb} MB of memory"
-        if self.tree.count() > MOST_PROCESSES:
+        if self.tree.more_than(MOST_PROCESSES):
             return f"started more than {MOST_PROCESSES} processes"
         if self.private is not None and larger(self.private, self.output_mb * 2**20):
             return f"wrote more than {self.output_mb} MB of files"
@@ -58,13 +58,13 @@ def larger(folder: Path, limit: int) -> bool:
     return False
 
 
-def _sizes(folder: Path) -> Iterator[int]:
+def _sizes(folder: Path | str) -> Iterator[int]:
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
                 try:
                     if entry.is_dir(follow_symlinks=False):
-                        yield from _sizes(Path(entry.path))
+                        yield from _sizes(entry.path)
                     else:
                         yield entry.stat(follow_symlinks=False).st_blocks * 512
                 except OSError:  # gone already

@@ -99,9 +99,10 @@ class ProcessTree:
                 total += member.memory_info().rss
         return total / 2**20
 
-    def count(self) -> int:
-        """How many processes there are, as of the last look at their memory."""
-        return sum(_runs(member) for member in list(self._members.values()))
+    def more_than(self, most: int) -> bool:
+        """Whether more than `most` processes run, as of the last look at their memory."""
+        members = list(self._members.values())  # those that have ended, too
+        return len(members) > most and sum(map(_runs, members)) > most
 
     def kill(self) -> None:
         """Ends every member at once. Harmless where all of them are gone."""

@@ -46,16 +46,20 @@ def available() -> dict[str, Factory]:
     return {name: functools.partial(_load, name, found[name]) for name in sorted(found)}
 
 
-def create(name: str) -> Renderer:
-    """The registered renderer `name`. Raises InputError where there is none, or as its factory."""
+def create(name: str, option: str = "--renderer", besides: tuple[str, ...] = ()) -> Renderer:
+    """The registered renderer `name`. Raises InputError where there is none, or as its factory.
+
+    It was given as `option`, which takes the names in `besides`, too.
+    """
     factories = available()
     if name not in factories:
+        names = [*factories, *besides]
         raise InputError.of(
             "unknown renderer",
-            key="--renderer",
+            key=option,
             value=name,
-            expected="one of " + ", ".join(factories),
-            suggestion=nearest(name, factories),
+            expected="one of " + ", ".join(names),
+            suggestion=nearest(name, names),
         )
     return factories[name]()
 

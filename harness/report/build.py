@@ -82,6 +82,7 @@ class _Report:
 
     def __init__(self, run_folder: Path, file: SummaryFile) -> None:
         self.folder = run_folder
+        self.top, self.below = RunFolder(run_folder), RunFolder(run_folder, up="../")
         self.file = file
         self.summary = summary = file.head
         self.digest = digest_of(file)
@@ -136,10 +137,9 @@ class _Report:
 
     def _row(self, case_id: str, record: CaseRecord | None, note: str, spool: Spool) -> view.Line:
         page = f"cases/{url(page_name(case_id))}" if record else None
-        folder = RunFolder(self.folder)
         case = self.file.case(self.order[self.place[case_id]].span)
         row = view.row(
-            case, record, self.renderers, self.colours, folder, page=page, note=clean(note)
+            case, record, self.renderers, self.colours, self.top, page=page, note=clean(note)
         )
         return view.line(row, spool.keep(self.row_template.render(row=row, absent=self.absent)))
 
@@ -160,14 +160,13 @@ class _Report:
         named += [path for run in record.runs for path in run.files.values()]
         named += [d.path for d in record.differences]
         named += [name for image in images for name in (image.path, image.picture, image.thumbnail)]
-        folder = RunFolder(self.folder)
-        there = [folder.href(name) for name in named if name]
+        there = [self.top.href(name) for name in named if name]
         neighbours = repr(self._neighbours(record.id))
         shown = [self.code, self.summary.snellcheck_version, dict(self.colours), there, neighbours]
         return hashlib.sha256(path.read_bytes() + json.dumps(shown).encode()).hexdigest()
 
     def case(self, record: CaseRecord, path: Path, stamp: str) -> str:
-        folder = RunFolder(self.folder, up="../")
+        folder = self.below
         runs = [
             (run, verdict, [view.picture(image, folder) for image in run.images])
             for run in record.runs

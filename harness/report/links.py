@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import posixpath
 import re
+import stat
 from pathlib import Path
 from urllib.parse import quote
 
@@ -48,17 +51,38 @@ class RunFolder:
     def __init__(self, root: Path, up: str = "") -> None:
         self.root = root.resolve()
         self.up = up
+        self._inside: dict[str, str | None] = {}  # folders of paths, as they lie in the root
 
     def href(self, path: str | None) -> str | None:
         """A link to a file of the run; None where it is absent or lies outside the folder."""
         if not path or "\x00" in path:
             return None
+        parent, _, name = path.rpartition("/")
+        if parent not in self._inside:
+            self._inside[parent] = self._place(self.root / parent)
+        folder = self._inside[parent]
+        plain = folder is not None and name not in ("", ".", "..")
+        if plain and stat.S_ISREG(_mode(f"{self.root}/{folder}/{name}")):
+            place: str | None = posixpath.normpath(f"{folder}/{name}")
+        else:  # it is not there, or leads somewhere else
+            place = self._place(self.root / path, is_file=True)
+        return None if place is None else self.up + url(place)
+
+    def _place(self, path: Path, *, is_file: bool = False) -> str | None:
+        """Where `path` leads, from the root; None where that is outside or not there."""
         try:
-            target = (self.root / path).resolve()
-            if not target.is_file():
-                return None
-        except OSError:  # a name too long, a loop of symbolic links
+            target = path.resolve()
+            there = target.is_file() if is_file else target.is_dir()
+        except (OSError, ValueError):  # too long, a loop of symbolic links, no name at all
             return None
-        if not target.is_relative_to(self.root):
+        if not there or not target.is_relative_to(self.root):
             return None
-        return self.up + url(target.relative_to(self.root).as_posix())
+        return target.relative_to(self.root).as_posix()
+
+
+def _mode(path: str) -> int:
+    """What lies there, links not followed; 0 where nothing does."""
+    try:
+        return os.lstat(path).st_mode
+    except (OSError, ValueError):
+        return 0

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import base64
 import json
-import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,8 +60,11 @@ def rounded(values: NDArray[np.floating], bits: int = FOR_DRAWING) -> NDArray[np
 
 def squeezed(values: NDArray[Any]) -> str:
     """Base64 of the deflated, shuffled bytes of an array of 4-byte items."""
+    import imagecodecs  # libdeflate takes a third of zlib's time, and a little less room
+
     shuffled = values.reshape(-1).view(np.uint8).reshape(-1, 4).T.tobytes()
-    return base64.b64encode(zlib.compress(shuffled, 6)).decode("ascii")
+    deflated = imagecodecs.deflate_encode(shuffled, level=6, raw=False)
+    return base64.b64encode(deflated).decode("ascii")
 
 
 def array(values: NDArray[np.floating], bits: int = FOR_DRAWING) -> dict[str, Any]:

@@ -18,6 +18,9 @@ Matrix = tuple[Vec3, Vec3, Vec3]  # rows
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 SHORTEST = 1e-100  # a shorter vector has too few digits for a direction
+# Between these, products of numbers and of their halves neither overflow nor lose bits.
+TINY, HUGE = 2.0**-400, 2.0**400
+SPLITTER = 2.0**27 + 1
 PARALLEL = 1e-6  # sine of an angle below which two directions define no frame
 
 
@@ -26,8 +29,28 @@ def exact_dot(a: Sequence[float], b: Sequence[float]) -> Fraction:
 
 
 def dot(a: Sequence[float], b: Sequence[float]) -> float:
-    """The dot product, correctly rounded."""
-    return float(exact_dot(a, b))
+    """The dot product, correctly rounded.
+
+    Each product is split into its rounded value and the exact rest of it (Dekker 1971), and
+    `math.fsum` rounds their sum once; ten times as fast as fractions.
+    """
+    terms: list[float] = []
+    for x, y in zip(a, b, strict=True):
+        if x != 0.0 and y != 0.0:
+            if not (TINY < abs(x) < HUGE and TINY < abs(y) < HUGE):  # parts could be lost
+                return float(exact_dot(a, b))
+            (x_high, x_low), (y_high, y_low) = _halves(x), _halves(y)
+            product = x * y
+            rest = x_low * y_low - (((product - x_high * y_high) - x_low * y_high) - x_high * y_low)
+            terms += product, rest
+    return math.fsum(terms)
+
+
+def _halves(x: float) -> tuple[float, float]:
+    """`x` as a sum of two numbers of 26 bits each, so that products of such are exact."""
+    scaled = SPLITTER * x
+    high = scaled - (scaled - x)
+    return high, x - high
 
 
 def cross(a: Vec3, b: Vec3) -> Vec3:

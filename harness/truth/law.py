@@ -78,7 +78,7 @@ class Law:
 
     `normal` is what becomes of an interface's normals, given which are a mesh's, `start` where a
     ray goes on that leaves an interface along its second argument, `transmittance` what weighs a
-    transmitted ray, given R.
+    transmitted ray, given R. `depth` is 0 in media that do not absorb, where it may not be asked.
     """
 
     normal: Callable[[Float, Mask], Float] = lambda n, _: n

@@ -32,8 +32,9 @@ class TruePaths:
     `status` is HIT (not ended early), MISS (no such interface) or TIR. `origin` and `direction`
     (m, 3) are the ray that leaves the last interface, in `medium` (m,). `weight` is the product of
     the Fresnel factors and `absorbed` (m, 3) the optical depth so far. Per interface k:
-    `cos_theta_i` (m, letters), `eta_i_over_t` (m, letters; 1 where it is reflected), `interface`
-    (m, letters, 3) and `n` (m, letters, 3) facing the ray.
+    `cos_theta_i` (m, letters), `eta_i_over_t` (m, letters; 1 where it is reflected), `total`
+    (m, letters) where all light is reflected, `interface` (m, letters, 3) and `n` (m, letters, 3)
+    facing the ray.
     `inside` (solids, m) says which solids the ray is in, and `ahead` (m,) how far away the next
     interface is; infinite where there is none.
     """
@@ -46,6 +47,7 @@ class TruePaths:
     absorbed: Float
     cos_theta_i: Float
     eta_i_over_t: Float
+    total: NDArray[np.bool_]
     interface: Float
     n: Float
     inside: NDArray[np.bool_]
@@ -90,6 +92,7 @@ class ClosedForm:
         meeting = [np.abs(bounds(solid.shape)).max() for solid in scene.solids if solid.meets]
         self._meeting, self._extent = bool(meeting), float(max(meeting, default=0.0))
         self._meshes = np.array([isinstance(s.shape, Mesh) for s in scene.solids] or [False])
+        self._absorbs = any(max(medium.absorption) > 0 for medium in scene.media)
 
     def follow(self, rays: Rays, path: str) -> TruePaths:
         """Rays from the camera along `path`."""
@@ -100,6 +103,7 @@ class ClosedForm:
         status = np.full(m, Status.HIT, np.int8)
         weight, absorbed = np.ones(m), np.zeros((m, 3))
         cos_i, eta = np.full((m, count), np.nan), np.ones((m, count))
+        whole = np.zeros((m, count), bool)
         interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
         ior = np.array([medium.ior for medium in scene.media])
         sigma = np.array([medium.absorption for medium in scene.media])
@@ -120,7 +124,8 @@ class ClosedForm:
             t = np.where(live, t, 0.0)
             o = o + t[:, None] * d
             start = normals[:, k - 1] if k else None
-            absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
+            if self._absorbs:
+                absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
             facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
             facing = law.normal(facing, self._meshes[which])
             leaving = inside[which, rows] if bodies else live
@@ -131,6 +136,7 @@ class ClosedForm:
             at = Interface(o, d, facing, ior[medium], ior[beyond], ~leaving, t, self._meshes[which])
             c, reflectance = at.cos_theta_i, law.reflectance(at)
             cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
+            whole[:, k] = live & (reflectance >= 1)
             if letter == "R":
                 weight *= np.where(live, reflectance, 1.0)
                 d = np.where(live[:, None], reflect(d, facing), d)
@@ -150,8 +156,9 @@ class ClosedForm:
             medium = np.where(live, beyond, medium)
         ahead = self.next_interface(o, d, inside).t
         return TruePaths(
-            status, o, d, medium, weight, absorbed, cos_i, eta, interface, normals, inside, ahead
-        )
+            status, o, d, medium, weight, absorbed, cos_i, eta, whole, interface, normals, inside,
+            ahead,
+        )  # fmt: skip
 
     def land(self, paths: TruePaths, plane: Rectangle) -> Landing:
         """Where the rays meet `plane`: MISS beside it, CUT where another interface comes first."""
@@ -188,6 +195,8 @@ class ClosedForm:
         status[(status == Status.HIT) & (ahead < t)] = Status.CUT
         landed = status == Status.HIT
         point[~landed] = np.nan
+        if not self._absorbs:
+            return Landing(status, point, np.ones((len(o), 3)))
         sigma = np.array([medium.absorption for medium in self.scene.media])
         leg = Leg(np.where(landed, t, 0.0), d, sigma[medium], start, "")
         depth = absorbed + self.law.depth(leg)

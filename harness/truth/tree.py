@@ -33,7 +33,8 @@ class Branch:
 
     `rows` (k,) says which. `weight` (k,) is the product of unpolarised Fresnel factors, `natural`
     (k,) that of polarised light, NaN where nobody asked for it, `absorbed` (k, 3) the optical depth
-    so far. The next interface is `ahead` (k,) away, infinite where there is none.
+    so far. `certain` (k,) are those that were reflected nowhere but where all light is. The next
+    interface is `ahead` (k,) away, infinite where there is none.
     """
 
     path: str
@@ -44,6 +45,7 @@ class Branch:
     weight: Float
     natural: Float
     absorbed: Float
+    certain: NDArray[np.bool_]
     ahead: Float
 
 
@@ -63,13 +65,16 @@ class _Front:
     medium: NDArray[np.intp]
     weight: Float
     absorbed: Float
+    certain: NDArray[np.bool_]
     field: Complex
 
     def take(self, keep: NDArray[np.bool_]) -> _Front:
         """Only the rays `keep` (k,)."""
+        if keep.all():
+            return self
         return _Front(
             self.path, self.rows[keep], self.o[keep], self.d[keep], self.inside[:, keep],
-            self.medium[keep], self.weight[keep], self.absorbed[keep],
+            self.medium[keep], self.weight[keep], self.absorbed[keep], self.certain[keep],
             self.field[keep] if len(self.field) else self.field,
         )  # fmt: skip
 
@@ -87,20 +92,19 @@ def branches(
     depth: int,
     min_weight: float = 0.0,
     along: str | None = None,
-    partial: bool = True,
     natural: bool = False,
 ) -> Iterator[Branch]:
     """All branches of at most `depth` segments and at least `min_weight`, depth first.
 
-    With `along`, only those that start as it does; without `partial`, only those that are reflected
-    where all light is. `natural` asks for the weight of polarised light, which is half the work.
+    With `along`, only those that start as it does. `natural` asks for the weight of polarised
+    light, which is half the work.
     """
     inside = form.enclosed(rays)
     m = len(rays.origins)
     start = _Front(
         "", np.arange(m), rays.origins, rays.directions, inside,
         np.full(m, form.scene.camera.medium, np.intp), np.ones(m), np.zeros((m, 3)),
-        _two_waves(rays.directions if natural else rays.directions[:0]),
+        np.ones(m, bool), _two_waves(rays.directions if natural else rays.directions[:0]),
     )  # fmt: skip
     waiting = [start]
     while waiting:
@@ -108,7 +112,7 @@ def branches(
         met = form.next_interface(front.o, front.d, front.inside)
         yield Branch(
             front.path, front.rows, front.o, front.d, front.medium, front.weight, front.natural(),
-            front.absorbed, met.t,
+            front.absorbed, front.certain, met.t,
         )  # fmt: skip
         goes_on = np.isfinite(met.t)
         if len(front.path) + 1 >= depth or not goes_on.any():
@@ -117,13 +121,13 @@ def branches(
             met.t[goes_on], met.n[goes_on], met.beyond[goes_on],
             met.before[:, goes_on], met.behind[:, goes_on],
         )  # fmt: skip
-        for child in _split(form, front.take(goes_on), met, partial):
+        for child in _split(form, front.take(goes_on), met):
             child = child.take(child.weight > min_weight) if min_weight else child
             if len(child.rows) and (along is None or along.startswith(child.path)):
                 waiting.append(child)
 
 
-def _split(form: ClosedForm, front: _Front, met: Boundary, partial: bool) -> tuple[_Front, _Front]:
+def _split(form: ClosedForm, front: _Front, met: Boundary) -> tuple[_Front, _Front]:
     """Both rays that each ray becomes at its interface; one where there is total reflection."""
     ior = np.array([medium.ior for medium in form.scene.media])
     sigma = np.array([medium.absorption for medium in form.scene.media])
@@ -136,18 +140,19 @@ def _split(form: ClosedForm, front: _Front, met: Boundary, partial: bool) -> tup
     back = reflect(front.d, met.n)
     waves = len(front.field) > 0
     r, t = _amplitudes(cos_i, ior_i, ior_t) if waves else (front.field, front.field)
-    everyone = np.full(len(o), partial)
 
-    def child(letter: str, d: Float, weight: Float, amplitude: Complex, crosses: bool) -> _Front:
-        inside = met.behind if crosses else met.before
+    def child(letter: str, d: Float, weight: Float, amplitude: Complex) -> _Front:
+        crosses = letter == "T"
         field = _turned(front.field, front.d, d, met.n, amplitude) if waves else front.field
-        medium = met.beyond if crosses else front.medium
         return _Front(
-            front.path + letter, front.rows, o, d, inside, medium, front.weight * weight, absorbed,
-            field,
-        ).take(~total if crosses else everyone | total)  # fmt: skip
+            front.path + letter, front.rows, o, d,
+            met.behind if crosses else met.before, met.beyond if crosses else front.medium,
+            front.weight * weight, absorbed,
+            front.certain if crosses else front.certain & total, field,
+        )  # fmt: skip
 
-    return child("R", back, reflectance, r, False), child("T", bent, 1 - reflectance, t, True)
+    passed = child("T", bent, 1 - reflectance, t).take(~total)
+    return child("R", back, reflectance, r), passed
 
 
 def _amplitudes(cos_i: Float, ior_i: Float, ior_t: Float) -> tuple[Complex, Complex]:
@@ -211,13 +216,15 @@ class AllLight:
     """What all paths bring together: `level` (m, 3) by a renderer's unpolarised Fresnel factors,
     `natural` (m, 3) by nature's, NaN where it was not asked for, and `cut` (m,) the weight of paths
     left out: too weak, too long.
-    `closest` (m,) is the shortest way between two interfaces on any of them.
+    `closest` (m,) is the shortest way between two interfaces on any of them. `abroad` tells whether
+    any of the light started in another medium than the camera's.
     """
 
     level: Float
     natural: Float
     cut: Float
     closest: Float
+    abroad: bool
 
 
 def light_on(
@@ -238,7 +245,7 @@ def light_on(
     per_medium = (ior[form.scene.camera.medium] / ior) ** 2 if n2 else np.ones(len(ior))
     m = len(rays.origins)
     level, polarised, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
-    closest = np.full(m, np.inf)
+    closest, abroad = np.full(m, np.inf), False
     for branch in branches(form, rays, depth, min_weight, natural=natural):
         if branch.path:
             closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
@@ -247,12 +254,15 @@ def light_on(
         )
         on = landing.status == Status.HIT
         ends = on | ~np.isfinite(branch.ahead)
-        rows = branch.rows[on]
-        left = landing.transmission[on] * per_medium[branch.medium[on]][:, None]
+        rows, medium = branch.rows[on], branch.medium[on]
+        abroad = abroad or bool((medium != form.scene.camera.medium).any())
+        left = landing.transmission[on] * per_medium[medium][:, None]
         level[rows] += branch.weight[on, None] * left
-        polarised[rows] += branch.natural[on, None] * left
+        if natural:
+            polarised[rows] += branch.natural[on, None] * left
         followed[branch.rows[ends]] += branch.weight[ends]
-    return AllLight(level, polarised if natural else np.full((m, 3), np.nan), 1 - followed, closest)
+    polarised = polarised if natural else np.full((m, 3), np.nan)
+    return AllLight(level, polarised, 1 - followed, closest, abroad)
 
 
 def light_around(
@@ -261,13 +271,16 @@ def light_around(
     """The same where everything around shines with radiance 1: a white furnace."""
     m = len(rays.origins)
     level, polarised, followed = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
-    closest = np.full(m, np.inf)
+    closest, abroad = np.full(m, np.inf), False
     for branch in branches(form, rays, depth, min_weight, natural=natural):
         if branch.path:
             closest[branch.rows] = np.minimum(closest[branch.rows], branch.ahead)
         leaves = ~np.isfinite(branch.ahead)
         rows, left = branch.rows[leaves], np.exp(-branch.absorbed[leaves])
         level[rows] += branch.weight[leaves, None] * left
-        polarised[rows] += branch.natural[leaves, None] * left
+        if natural:
+            polarised[rows] += branch.natural[leaves, None] * left
         followed[rows] += branch.weight[leaves]
-    return AllLight(level, polarised if natural else np.full((m, 3), np.nan), 1 - followed, closest)
+        abroad = abroad or bool((branch.medium[leaves] != form.scene.camera.medium).any())
+    polarised = polarised if natural else np.full((m, 3), np.nan)
+    return AllLight(level, polarised, 1 - followed, closest, abroad)

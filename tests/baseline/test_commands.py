@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from click.testing import CliRunner
 from harness import cli, imagefile, record
 from harness.baseline.document import parse_baseline, write_baseline
 from harness.errors import RendererMissing
+from harness.history.revision import Revision
+from harness.history.store import History
 from harness.record import BaselineState, Verdict
 from harness.run import run as run_cases
 from tests.fakes.student import student
@@ -164,7 +167,8 @@ def test_errors_are_not_approved(renderer: str, invoke: Invoke) -> None:
         (["slab", "--reason", "  "], "say why"),
         (["slabs", "--reason", "x"], "did you mean"),
         (["slab", "--reason", "x", "-r", "povray"], "not a renderer of the run"),
-        (["--reason", "x"], "name the cases"),
+        (["--reason", "x"], "nothing to approve"),
+        (["slab", "--reason", "x", "--from", "none.json"], "both cases and --from"),
         (["--reason", "x", "--from", "none.json"], "cannot be read"),
     ],
 )
@@ -269,6 +273,7 @@ def test_an_unreadable_baseline_fails(damage: object, said: str, work: Invoke) -
     result = work("check", "--run", "out")
     assert result.exit_code == 1
     assert said in result.output.replace("\n", "")
+    assert result.output.count(path.name) == 1
 
 
 def test_a_changed_scene_makes_its_baseline_stale(work: Invoke, tmp_path: Path) -> None:
@@ -330,22 +335,49 @@ def test_why_git_knows_no_revision_is_told(work: Invoke, monkeypatch: pytest.Mon
     assert "git cannot be run" in result.output
 
 
-def test_a_slide_over_runs_is_reported_though_each_run_is_fine(work: Invoke) -> None:
+def slid(count: int) -> Iterator[record.Summary]:
+    """Summaries of the runs before that in `out`, a check of which slides towards what it is."""
     summary = record.read_summary(Path("out") / "summary.json")
     index = next(k for k, case in enumerate(summary.cases) if case.id == SLAB)
     case = summary.cases[index]
     first = case.checks[0]
     assert first.value is not None
     assert first.tolerance is not None
-    for k in range(9):  # ten runs in a row, this one last
-        slid = first.model_copy(update={"value": first.value - (9 - k) * 0.01 * first.tolerance})
+    for k in range(count):
+        value = first.value - (count - k) * 0.01 * first.tolerance
+        slid = first.model_copy(update={"value": value})
         started = f"2026-11-{k + 1:02}T00:00:00+00:00"
         cases = [case.model_copy(update={"checks": [slid, *case.checks[1:]]})]
-        earlier = summary.model_copy(update={"cases": cases, "started": started})
+        yield summary.model_copy(update={"cases": cases, "started": started})
+
+
+def test_a_slide_over_runs_is_reported_though_each_run_is_fine(work: Invoke) -> None:
+    for k, earlier in enumerate(slid(9)):  # ten runs in a row, that in `out` last
         record.write(earlier, Path(f"history/{k}/summary.json"))
     result = work("check", "--run", "out", "--history", "history")
     assert result.exit_code == 0
     assert "drifting" in result.output
+    assert record.read_summary(Path("out") / "summary.json").baseline.runs == 10  # type: ignore[union-attr]
+
+
+def test_slides_are_looked_for_in_the_history_as_runs_came(
+    work: Invoke, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Whatever the clock said: here it goes back by a day from run to run."""
+    history = History(tmp_path / "past.sqlite")
+    monkeypatch.setenv("SNELLCHECK_HISTORY", str(history.file))
+    for k, earlier in enumerate(slid(9)):
+        turned = earlier.model_copy(update={"started": f"2026-10-{30 - k:02}T00:00:00+00:00"})
+        assert history.add(turned, Revision("", dirty=False), Path("out")) == ""
+    result = work("check", "--run", "out")
+    assert result.exit_code == 0
+    assert "drifting" in result.output
+    history.file.write_bytes(b"no database at all" * 100)
+    result = work("check", "--run", "out")
+    assert result.exit_code == 0
+    assert "slow slides are not looked for" in result.output
+    monkeypatch.setenv("SNELLCHECK_HISTORY", str(tmp_path / "none.sqlite"))
+    assert "there are 1" in work("check", "--run", "out").output
 
 
 # --- standing in for what is missing --------------------------------------------------------------

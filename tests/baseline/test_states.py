@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from harness.baseline.compare import STEP, against
 from harness.baseline.document import Kept
 from harness.baseline.means import mean_shift
-from harness.baseline.trend import LEVEL, chance, deviations, slope, trends
+from harness.baseline.trend import LEVEL, REPEATED, Key, chance, deviations, slope, trends
 from harness.record import AgainstBaseline, BaselineState, Verdict
 from tests.baseline.documents import baseline, check, image, kept, record, stored_image
 
@@ -155,10 +156,16 @@ def test_the_same_pixels_say_nothing() -> None:
 # --- drift ----------------------------------------------------------------------------------------
 
 
+def runs_of(series: Mapping[Key, Sequence[float]]) -> list[dict[Key, float]]:
+    """The deviations of checks run by run; the shorter series are of the first runs."""
+    longest = max(map(len, series.values()))
+    return [{key: d[k] for key, d in series.items() if k < len(d)} for k in range(longest)]
+
+
 def test_a_slow_slide_within_tolerance_is_found() -> None:
     slide = [0.01 * k for k in range(10)]
     flat = [0.3] * 10
-    (found,) = trends({("case", "slides"): slide, ("case", "stays"): flat})
+    (found,) = trends(runs_of({("case", "slides"): slide, ("case", "stays"): flat}))
     assert (found.check, found.runs) == ("slides", 10)
     assert found.slope == pytest.approx(0.01)
     assert "in some 91 runs" in found.reason  # (1 - 0.09) / 0.01
@@ -172,7 +179,7 @@ def test_what_hides_in_steps_that_are_the_same_is_named_before_it_matters() -> N
     assert {state_of(a, b).state for a, b in itertools.pairwise(slide)} == {SAME}
     for runs, named in ((9, []), (10, ["slides"])):
         series = others | {("c", "slides"): slide[:runs]}
-        assert [trend.check for trend in trends(series)] == named
+        assert [trend.check for trend in trends(runs_of(series))] == named
     assert slide[-1] < 1 < slide[-1] + 2 * step  # so a step could not be much larger
 
 
@@ -198,7 +205,25 @@ def test_one_step_is_no_drift_and_neither_is_noise_nor_a_speck() -> None:
     noise = [0.31, 0.12, 0.27, 0.35, 0.11, 0.22, 0.36, 0.14, 0.29, 0.2]
     speck = [1e-12 * k for k in range(10)]
     series = {("c", "step"): step, ("c", "noise"): noise, ("c", "speck"): speck}
-    assert trends(series) == []
+    assert trends(runs_of(series)) == []
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-6])
+def test_runs_that_repeat_the_one_before_are_no_evidence(rounding: float) -> None:
+    """A renderer that changed once, and was run fifteen times before and after, does not slide."""
+    once = [0.1 + rounding * (k % 3) for k in range(15)] + [
+        0.4 - rounding * (k % 4) for k in range(15)
+    ]
+    assert trends(runs_of({("c", "once"): once})) == []
+    slide = [0.01 * (k // 6) for k in range(60)]  # each step is run six times
+    (found,) = trends(runs_of({("c", "once"): once, ("c", "slides"): slide}))
+    assert (found.check, found.runs) == ("slides", 10)
+
+
+def test_steps_too_small_to_count_add_up() -> None:
+    slide = [REPEATED / 4 * k for k in range(60)]
+    (found,) = trends(runs_of({("c", "slides"): slide}))
+    assert found.runs == 15
 
 
 def test_false_alarms_are_as_rare_as_stated() -> None:
@@ -211,7 +236,7 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
     alarms = 0
     for _ in range(200):
         series = {("c", str(k)): list(random.normal(0, 0.2, 12)) for k in range(20)}
-        alarms += bool(trends(series))
+        alarms += bool(trends(runs_of(series)))
     assert alarms <= 8
     assert LEVEL == 0.01
 
@@ -232,7 +257,7 @@ def test_what_was_not_measured_is_no_part_of_a_series() -> None:
         )
         for one in checks
     ]
-    assert deviations(summaries) == {("c", checks[0].id): [0.5]}
+    assert list(map(deviations, summaries)) == [{("c", checks[0].id): 0.5}, {}, {}]
 
 
 def test_kept_results_are_marked_with_their_hash() -> None:

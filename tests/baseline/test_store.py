@@ -103,9 +103,10 @@ def stored(url: str, work: Invoke, monkeypatch: pytest.MonkeyPatch) -> StoredIma
     return image
 
 
-def judged(work: Invoke) -> list[record.Check]:
+def judged(work: Invoke, *options: str) -> list[record.Check]:
     """All checks of a run of the ball, in which the stored picture may stand in for the student."""
-    work("run", "ball", "-r", "student", "-r", "tracer", "--scenes", SCENES, "--out", "out")
+    renderers = ("-r", "student", "-r", "tracer")
+    work("run", "ball", *renderers, "--scenes", SCENES, "--out", "out", *options)
     return checks_of(record.read_summary(Path("out") / "summary.json"))
 
 
@@ -120,15 +121,32 @@ def test_a_large_picture_stands_in_from_its_store(
     ((name, data),) = files(url).items()
     assert name.endswith(f"/{stored.sha256}.png")
     assert hashlib.sha256(data).hexdigest() == stored.sha256
-    assert {check.status for check in pairs(judged(work))} == {Verdict.PASS}
+    assert {check.status for check in pairs(judged(work, "--store", url))} == {Verdict.PASS}
 
 
 @pytest.mark.usefixtures("stored")
 def test_a_damaged_picture_in_a_store_is_refused(url: str, work: Invoke) -> None:
     ((_, data),) = files(url).items()
     overwrite(url, data[:-20] + b"x" + data[-19:])
+    checks = judged(work, "--store", url)
+    assert pairs(checks) == []
+    assert skipped(checks, "not of its hash")
+
+
+@pytest.mark.usefixtures("stored")
+def test_a_store_is_looked_into_only_where_the_user_names_it(
+    url: str, work: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A baseline may be anybody's, and its URL lead anywhere: here to the very picture."""
     checks = judged(work)
     assert pairs(checks) == []
-    assert any(
-        check.status is Verdict.SKIP and "not of its hash" in check.reason for check in checks
-    )
+    assert skipped(checks, "SNELLCHECK_STORE")
+    checks = judged(work, "--store", str(tmp_path / "empty"))
+    assert pairs(checks) == []
+    assert skipped(checks, "cannot be read")
+    monkeypatch.setenv("SNELLCHECK_STORE", url)
+    assert {check.status for check in pairs(judged(work))} == {Verdict.PASS}
+
+
+def skipped(checks: list[record.Check], why: str) -> bool:
+    return any(check.status is Verdict.SKIP and why in check.reason for check in checks)

@@ -43,11 +43,11 @@ REGISTERED: dict[str, Callable[[], Renderer]] = {
 def invoke(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Invoke:
     """The command line in an empty folder, with fakes registered as renderers."""
 
-    def create(name: str) -> Renderer:
+    def create(name: str, option: str = "--renderer", besides: tuple[str, ...] = ()) -> Renderer:
         if name not in REGISTERED:
             raise InputError.of(
-                "unknown renderer", key="--renderer", value=name,
-                suggestion=nearest(name, REGISTERED),
+                "unknown renderer", key=option, value=name,
+                suggestion=nearest(name, [*REGISTERED, *besides]),
             )  # fmt: skip
         return REGISTERED[name]()
 
@@ -207,7 +207,8 @@ MISTAKES: dict[str, tuple[list[str], str]] = {
     "a missing config": (["run", "--renderer-config", "no.toml"], "no.toml"),
     "one renderer twice": (["run", "-r", "student", "-r", "student"], "student"),
     "show an unknown case": (["show", "snel-sweep"], "did you mean snell-sweep?"),
-    "translate to nothing": (["translate", "snell-sweep", "--to", "povary"], "povary"),
+    "translate to nothing": (["translate", "snell-sweep", "--to", "povary"], "--to: "),
+    "translate to almost json": (["translate", "snell-sweep", "--to", "jsn"], "mean json?"),
     "translate without a target": (["translate", "snell-sweep"], "--to"),
     "report on nothing": (["report", "nowhere"], "nowhere"),
     "list an unknown case": (["list", "blal"], "did you mean ball?"),

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from harness.baseline.trend import deviations
 from harness.cli import main
 from harness.errors import InputError
 from harness.history import show as show_history
@@ -89,6 +90,23 @@ def test_runs_that_end_at_the_same_time_are_all_there(
     assert said == [""] * 8
     assert len(history.runs()) == 8
     assert len(history.of_case("snell-sweep")) == 8 * 2
+
+
+def test_the_runs_before_one_are_those_of_its_folder_and_quality(
+    history: History, summary: Summary, tmp_path: Path
+) -> None:
+    def begun(started: str, **more: object) -> Summary:
+        return summary.model_copy(update={"started": started, **more})
+
+    here, there = tmp_path / "here", tmp_path / "there"
+    for one, folder in (
+        (begun("3"), here), (begun("2"), there), (begun("1", quality="high"), here),
+        (begun("0"), here), (begun("now"), here),
+    ):  # fmt: skip
+        history.add(one, COMMIT, folder)
+    before = history.before(begun("now"), here)
+    assert before == [deviations(summary)] * 2
+    assert before[0]
 
 
 def test_a_damaged_history_is_put_aside(history: History, summary: Summary, tmp_path: Path) -> None:

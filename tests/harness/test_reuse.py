@@ -83,8 +83,9 @@ def records(out: Path) -> list[CaseRecord]:
 
 
 def results(effort: Effort) -> Effort:
-    """What became of the jobs, without the processor time that they took."""
-    return effort.model_copy(update={"own_cpu_s": 0.0, "renderers_cpu_s": 0.0})
+    """What became of the jobs, without the processor time and memory that they took."""
+    costs = {"own_cpu_s": 0.0, "renderers_cpu_s": 0.0, "memory_mb": 0.0}
+    return effort.model_copy(update=costs)
 
 
 # --- unchanged ------------------------------------------------------------------------------------

@@ -115,6 +115,7 @@ def test_the_summary_holds_what_scripts_rely_on(tmp_path: Path) -> None:
     effort = data["effort"]
     assert effort["own_cpu_s"] > 0
     assert effort["own_cpu_s"] > effort["renderers_cpu_s"] >= 0
+    assert effort["memory_mb"] > 20  # numpy alone
     assert data["counts"] == {"pass": 6, "fail": 0, "skip": 0, "error": 0, "known": 0}
     assert [case["id"] for case in data["cases"]] == SLABS
     case = data["cases"][0]

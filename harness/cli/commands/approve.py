@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from harness.cli.errors import reports_errors
-from harness.cli.options import BASELINES, reason_option, run_option
+from harness.cli.options import BASELINES, reason_option, run_option, store_option
 
 
 @click.command(name="approve")
@@ -24,7 +24,7 @@ from harness.cli.options import BASELINES, reason_option, run_option
     show_default=True, help="Folder to write to.",
 )  # fmt: skip
 @click.option("--by", default="", help="Who approves.  [default: as git knows you]")
-@click.option("--store", "url", help="Folder or URL for pictures that are too large for git.")
+@store_option
 @click.option("--dry-run", is_flag=True, help="Only show what would change.")
 @reports_errors
 def command(
@@ -35,7 +35,7 @@ def command(
     choices: Path | None,
     target: Path,
     by: str,
-    url: str | None,
+    store: str,
     dry_run: bool,
 ) -> None:
     """Make what the run measured for CASEs the baseline, per case and renderer.
@@ -46,12 +46,14 @@ def command(
     from harness.baseline.approve import approve, approver, choose, plan_approvals, read_choices
     from harness.baseline.run_folder import read_run
     from harness.baseline.source import Baselines, open_baselines
-    from harness.baseline.store import Store
+    from harness.baseline.store import store_at
     from harness.cli.baselines import show_plans
     from harness.errors import InputError
 
     if bool(case) == bool(choices):
-        raise InputError.of("name the cases to approve, or a file with --from", key="CASE")
+        message = "both cases and --from" if case else "nothing to approve"
+        expected = "cases, or a file of choices with --from"
+        raise InputError.of(message, key="CASE", expected=expected)
     run = read_run(folder)
     chosen = read_choices(choices) if choices else choose(run, case, renderers)
     present = open_baselines(str(target)) if target.is_dir() else Baselines(str(target))
@@ -60,5 +62,5 @@ def command(
     if dry_run:
         return
     who = by or approver()
-    for file in approve(plans, run, target, who, Store(url) if url else None):
+    for file in approve(plans, run, target, who, store_at(store)):
         click.echo(file)

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from harness.cli.errors import reports_errors
-from harness.cli.options import run_option
+from harness.cli.options import run_option, store_option
 
 
 @click.command(name="check")
@@ -25,8 +25,9 @@ from harness.cli.options import run_option
 )  # fmt: skip
 @click.option(
     "--history", type=click.Path(path_type=Path, file_okay=False, exists=True),
-    help="Folder of earlier runs, to find slow drift.",
+    help="Folder of earlier runs, to find slow drift in.  [default: the history of past runs]",
 )  # fmt: skip
+@store_option
 @reports_errors
 def command(
     case: tuple[str, ...],
@@ -35,11 +36,13 @@ def command(
     renderers: tuple[str, ...],
     partial: bool,
     history: Path | None,
+    store: str,
 ) -> None:
     """Compare a run with what was approved: all CASEs, or those a glob like "slab-*" selects.
 
     Fails with 1 where a check has regressed, is missing, or was approved for another scene. The
-    states are written into the run's records and shown in its report.
+    states are written into the run's records and shown in its report. Checks that slide slowly over
+    the last runs into the same folder are named, and fail nothing.
     """
     from harness.baseline.compare import compare
     from harness.baseline.outcome import outcome, write_outcome
@@ -47,17 +50,18 @@ def command(
     from harness.baseline.select import of_run, selector
     from harness.baseline.shown import show_pictures
     from harness.baseline.source import open_baselines
+    from harness.baseline.store import store_at
     from harness.baseline.trend import deviations, read_history, trends
-    from harness.cli.baselines import default_baseline, show_states
+    from harness.cli.baselines import default_baseline, past_runs, show_states
     from harness.report import write_report
 
     run = read_run(folder)
-    baselines = open_baselines(where or default_baseline())
+    baselines = open_baselines(where or default_baseline(), store_at(store))
     wanted = selector(case, renderers, run, baselines)
     comparison = compare(run, baselines, of_run(run, wanted) if partial else wanted)
-    earlier = read_history(history) if history else []
-    runs = [*(s for s in earlier if s.started != run.summary.started), run.summary]
-    found = outcome(comparison, baselines.source, trends(deviations(runs)))
+    past = read_history(history, run.summary) if history else past_runs(run)
+    runs = [*past, deviations(run.summary)]
+    found = outcome(comparison, baselines.source, trends(runs), len(runs))
     summary = write_outcome(show_pictures(run, baselines), comparison, found)
     index = write_report(folder)
     show_states(summary)

@@ -22,6 +22,7 @@ from harness.cli.options import (
     quality_option,
     renderer_option,
     scenes_option,
+    store_option,
     those_that_must_run,
 )
 from harness.cli.shards import divided
@@ -40,6 +41,7 @@ from harness.cli.shards import divided
     show_default=True,
     help="Let approved results stand in for renderers that are missing.",
 )
+@store_option
 @click.option(
     "--timeout",
     type=click.FloatRange(0.1),
@@ -85,6 +87,7 @@ def command(
     out: Path,
     jobs: int | None,
     stored: bool,
+    store: str,
     timeout: float,
     memory: int,
     seed: int,
@@ -105,9 +108,8 @@ def command(
     goes on where it stood.
     """
     from harness import show
-    from harness.baseline.stand_in import StandIns
     from harness.cache.cache import open_cache
-    from harness.cli.baselines import stand_in_sources
+    from harness.cli.baselines import stand_ins
     from harness.cli.interrupts import terminable
     from harness.cli.places import places
     from harness.cores import core_count
@@ -136,7 +138,7 @@ def command(
                 threads=place.threads(jobs or core_count()), timeout_s=timeout, memory_mb=memory,
                 report=progress, cache=cache,
                 command=" ".join(["snellcheck", *sys.argv[1:]]), must_run=must_run,
-                stand_ins=StandIns(stand_in_sources(), quality) if stored else None,
+                stand_ins=stand_ins(store, quality) if stored else None,
             )  # fmt: skip
     if cache is not None and cache.trouble:
         click.secho(f"warning: {cache.trouble}; nothing is kept", fg="yellow", err=True)

@@ -24,7 +24,7 @@ def command(case: str, target: str, out: Path | None, quality: str, scenes: Path
     from harness.record import write_text
     from harness.renderers import registry
 
-    renderer = None if target == "json" else registry.create(target)
+    renderer = None if target == "json" else registry.create(target, "--to", ("json",))
     root = out or Path("translated")
     for prepared in prepared_cases((case,), quality, scenes):
         folder = root / folder_name(prepared.loaded.id)

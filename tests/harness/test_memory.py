@@ -1,0 +1,44 @@
+"""The most memory that a run takes at a time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+from harness.running.memory import memory_mb, watched
+
+HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(); sys.stdin.read()"
+
+
+def test_the_largest_look_counts() -> None:
+    looks, third = iter([3.0, 8.0]), threading.Event()
+
+    def look() -> float:
+        found = next(looks, None)
+        if found is None:
+            third.set()
+        return found or 1.0
+
+    with watched(look, period_s=0.001) as peak:
+        assert third.wait(10)
+    assert peak.mb == 8.0
+
+
+def test_a_last_look_is_taken_however_short_the_run_was() -> None:
+    looks = []
+    with watched(lambda: looks.append(1) or float(len(looks)), period_s=60) as peak:
+        pass
+    assert peak.mb == len(looks) == 2
+
+
+def test_what_children_hold_counts_until_they_end() -> None:
+    before = memory_mb()
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLD], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        during = memory_mb()
+    assert during > before + 100
+    assert memory_mb() < during - 90
