@@ -7,8 +7,10 @@ package: after any change to any of its files, all of it is compiled anew.
 
 from __future__ import annotations
 
+import gc
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -47,21 +49,39 @@ def inlined(function: Function) -> Function:
     That saves the code that unpacks Python's arguments. It is merged into its callers, because
     a scene's arrays are a hundred arguments, too many to pass for every ray.
     """
-    return _compiled(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return _compiled(function, forceinline=True, no_cpython_wrapper=True)
 
 
 def called(function: Function) -> Function:
-    """As `inlined`, for what is too large, or called too rarely, to be merged by force."""
-    return _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    """As `inlined`, for what is too large, or called too rarely, to be merged by force.
+
+    This has to be said, or a function takes after the one for which it is compiled.
+    """
+    return _compiled(function, forceinline=False, no_cpython_wrapper=True)
 
 
 def merged(function: Function) -> Function:
     """As `inlined`, for what one function alone calls: merged first, and compiled once."""
-    return _compiled(function, inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return _compiled(function, inline="always", no_cpython_wrapper=True)
+
+
+@contextmanager
+def _no_collections() -> Iterator[None]:
+    """Keeps Python from looking for garbage, again and again among all that a compiler makes.
+
+    That would take a twentieth of the time, to find some 100 MB at the end.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _compiled(function: Function, **options: Any) -> Function:
-    options |= {"nogil": True, "_nrt": False}
+    options |= {"nogil": True, "_nrt": False, "no_cfunc_wrapper": True}  # C calls none of it
     try:
         dispatcher = _numba.njit(error_model="numpy", cache=True, **options)(function)
     except RuntimeError:  # neither beside the package nor at home may anything be written
@@ -75,7 +95,8 @@ def _compiled(function: Function, **options: Any) -> Function:
             """Not anew for every constant that a caller passes, which Numba takes for a type."""
             if isinstance(signature, tuple):
                 signature = tuple(_numba.types.unliteral(argument) for argument in signature)
-            return specialise(signature)
+            with _no_collections():
+                return specialise(signature)
 
         dispatcher.compile = compile_once
     return cast(Function, dispatcher)

@@ -73,31 +73,19 @@ def nearest_hit(
     left: int,
     left_face: int,
     inward: bool,
+    known: Floats,
     stack: Floats,
 ) -> Hit:
     """The next hit of a ray through `medium`, which may be UNKNOWN if the ray just begins.
 
     The ray has just left face `left_face` of object `left`, heading to the inside of it if
-    `inward`; or nothing, if `left` is NOTHING. Boundaries of solids where a solid of higher rank
-    is on both sides are passed over. Where two of them are nearer to each other than rounding, each
-    seems to lie before the other; a ray that makes no way there goes on beyond both.
+    `inward`; or nothing, if `left` is NOTHING. `known` has the hits of all meshes (see
+    `mesh_hits_ahead`), or is empty.
+
+    Boundaries of solids where a solid of higher rank is on both sides are passed over. Where two of
+    them are nearer to each other than rounding, each seems to lie before the other; a ray that
+    makes no way there goes on beyond both.
     """
-    return nearest_hit_knowing(scene, o, d, medium, left, left_face, inward, stack[:0], stack)
-
-
-@inlined
-def nearest_hit_knowing(
-    scene: Arrays,
-    o: Vec,
-    d: Vec,
-    medium: int,
-    left: int,
-    left_face: int,
-    inward: bool,
-    known: Floats,
-    stack: Floats,
-) -> Hit:
-    """As `nearest_hit`, where `known` has the hits of all meshes, or none (see `mesh_hits`)."""
     travelled, waiting = 0.0, 0
     while True:
         hit = _next_hit(scene, o, d, medium, left, left_face, inward, known, stack)

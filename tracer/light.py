@@ -53,7 +53,7 @@ def unshadowed(
     """
     passed = (1.0, 1.0, 1.0)
     while True:
-        hit = nearest_hit(scene, o, to_light, medium, left, left_face, inward, stack)
+        hit = nearest_hit(scene, o, to_light, medium, left, left_face, inward, stack[:0], stack)
         passed = mul(passed, absorbed(scene.media, medium, min(hit.t, distance)))
         if hit.t >= distance:
             return passed

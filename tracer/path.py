@@ -26,7 +26,7 @@ from tracer.arrays import (
 )
 from tracer.compiled import compiled, inlined, merged
 from tracer.errors import SceneError
-from tracer.hit import NOTHING, UNKNOWN, hit_point, mesh_hits_ahead, nearest_hit_knowing, new_stack
+from tracer.hit import NOTHING, UNKNOWN, hit_point, mesh_hits_ahead, nearest_hit, new_stack
 from tracer.optics import reflect
 from tracer.scene import Scene
 from tracer.shapes import vec_at
@@ -77,14 +77,7 @@ class Paths(NamedTuple):
     reflectance: Floats
 
 
-class Log(NamedTuple):
-    """What is kept of one ray, if anything: rows of `Paths`, and how many legs there are so far."""
-
-    vertices: Floats
-    solid: NDArray[np.int32]
-    cos_theta_i: Floats
-    cos_theta_t: Floats
-    reflectance: Floats
+OF_LEGS = ("vertices", "solid", "cos_theta_i", "cos_theta_t", "reflectance")
 
 
 class Beyond(NamedTuple):
@@ -165,25 +158,29 @@ def _follow_one(
     letters: NDArray[np.uint8],
     main: bool,
     max_depth: int,
-    log: Log,
+    found: Paths,
+    row: int,
     known: Floats,
     stack: Floats,
 ) -> tuple[int, int, Vec, Vec, float, float]:
     """(status, object or NOTHING, last point, last direction, weight, optical length).
 
-    Along `letters`; or if `main` the main way, until something is met that ends it.
+    Along `letters`; or if `main` the main way, until something is met that ends it. Its legs are
+    written to a row of `found`, as many as there is room for.
     """
+    legs = found.solid.shape[1]
     weight, optical, medium = 1.0, 0.0, UNKNOWN
     left, left_face, inward = NOTHING, -1, False
     step, corners = 0, 0
     while True:
-        corners = _keep(log.vertices, corners, o)
-        hit, face, t, entering, medium, beyond = nearest_hit_knowing(
+        corners = _keep(found.vertices, row, corners, o)
+        hit, face, t, entering, medium, beyond = nearest_hit(
             scene, o, d, medium, left, left_face, inward, known, stack
         )
         known = known[:0]
-        if corners <= len(log.solid):
-            log.solid[corners - 1] = medium
+        leg = corners - 1
+        if leg < legs:
+            found.solid[row, leg] = medium
         if hit == NOTHING:
             return MISS, NOTHING, o, d, weight, optical
         p, n, geometric = hit_point(scene, o, t, d, hit, face, entering)
@@ -196,26 +193,26 @@ def _follow_one(
         else:
             complete = step == len(letters)
         if complete or step + 1 >= max_depth:
-            _keep(log.vertices, corners, p)
+            _keep(found.vertices, row, corners, p)
             return HIT if complete and opaque else CUT, hit, p, d, weight, optical
         transmit = material != MIRROR if main else letters[step] == TRANSMIT
         twice = main or (step + 1 < len(letters) and letters[step + 1] == TRANSMIT)
         status, o, d, factor, more, cos_theta_i, cos_theta_t, reflectance = _take(
             scene, hit, entering, p, n, geometric, d, medium, beyond, transmit, twice
         )
-        if corners <= len(log.solid):
-            log.cos_theta_i[corners - 1], log.cos_theta_t[corners - 1] = cos_theta_i, cos_theta_t
-            log.reflectance[corners - 1] = reflectance
+        if leg < legs:
+            found.cos_theta_i[row, leg], found.cos_theta_t[row, leg] = cos_theta_i, cos_theta_t
+            found.reflectance[row, leg] = reflectance
         weight *= factor
         optical += more
         if main and status == TIR:
             status, transmit = GOING, False
         if status != GOING:
-            _keep(log.vertices, corners, p)
+            _keep(found.vertices, row, corners, p)
             return status, hit, p, d, weight, optical
         step += 1
         if transmit and material == THIN_SLAB:
-            corners = _keep(log.vertices, corners, p)
+            corners = _keep(found.vertices, row, corners, p)
             step += 1
         if transmit and material == DIELECTRIC:
             medium = beyond
@@ -223,10 +220,11 @@ def _follow_one(
 
 
 @inlined
-def _keep(vertices: Floats, corners: int, p: Vec) -> int:
+def _keep(vertices: Floats, row: int, corners: int, p: Vec) -> int:
     """Writes a vertex where vertices are asked for; the number of vertices so far."""
-    if corners < len(vertices):
-        _put(vertices, corners, p)
+    if corners < vertices.shape[1]:
+        for k in range(3):
+            vertices[row, corners, k] = p[k]
     return corners + 1
 
 
@@ -250,16 +248,9 @@ def _follow(
     mesh_hits_ahead(scene, origins[begin:end], directions[begin:end], ahead, lanes)
     for i in range(begin, end):
         o, d = vec_at(origins, i, 0), vec_at(directions, i, 0)
-        k = i if len(found.vertices) == len(origins) else 0  # all share one row that is empty
-        log = Log(
-            found.vertices[k],
-            found.solid[k],
-            found.cos_theta_i[k],
-            found.cos_theta_t[k],
-            found.reflectance[k],
-        )
+        row = min(i, len(found.solid) - 1)  # or else all share one that is empty
         status, hit, p, d, weight, length = _follow_one(
-            scene, o, d, letters, main, max_depth, log, ahead[i - begin], stack
+            scene, o, d, letters, main, max_depth, found, row, ahead[i - begin], stack
         )
         found.status[i], found.weight[i], found.optical_length[i] = status, weight, length
         found.surface[i] = hit - solids if status == HIT else -1
@@ -311,7 +302,7 @@ def follow(
 
     for_bands(worker, n, BAND, threads)
     if not vertices:
-        return found._replace(**{name: getattr(found, name)[:0] for name in Log._fields})
+        return found._replace(**{name: getattr(found, name)[:0] for name in OF_LEGS})
     places = {id(solid): k for k, solid in enumerate(scene.solids)}
     order = [places[id(solid)] for solid in ranked(scene.solids)]
     names = np.array([-1, *order, NO_LEG], np.int32)  # by medium; NO_LEG is the last

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.compiled import called
+from tracer.compiled import called, inlined
 from tracer.shapes import vec_at
 from tracer.vector import Vec, add, scale
 
@@ -95,7 +95,7 @@ def panorama_radiance(row: NDArray[np.float64], texels: NDArray[np.float64], d: 
     return seen
 
 
-@called
+@inlined
 def pattern_radiance(
     rows: NDArray[np.float64], row: int, texels: NDArray[np.float64], u: float, v: float
 ) -> Vec:
@@ -103,9 +103,8 @@ def pattern_radiance(
     if kind == CONSTANT:
         return vec_at(rows, row, 1)
     if kind == CHECKER:
-        columns, lines = rows[row, 7], rows[row, 8]
-        i = int(min(math.floor(u * columns), columns - 1.0))
-        j = int(min(math.floor(v * lines), lines - 1.0))
+        columns, lines = int(rows[row, 7]), int(rows[row, 8])
+        i, j = min(int(u * columns), columns - 1), min(int(v * lines), lines - 1)
         return vec_at(rows, row, 1 if (i + j) & 1 == 0 else 4)
     if kind == RAMP:
         c = u if rows[row, 7] == 0.0 else v

@@ -248,8 +248,9 @@ def _pass_hidden(scene: Arrays, wave: Wave, n: int, stack: Floats) -> None:
     for i in range(min(n, SIZE)):
         if 0 <= ints[HIT + i] < 2 * scene.solids and ints[BEFORE + i] == ints[BEYOND + i]:
             ray = ray_at(wave, i)
+            left, face = ray.left, ray.left_face
             hit = nearest_hit(
-                scene, ray.o, ray.d, ray.medium, ray.left, ray.left_face, ray.inward, stack
+                scene, ray.o, ray.d, ray.medium, left, face, ray.inward, stack[:0], stack
             )
             floats[T + i] = hit.t
             ints[HIT + i], ints[FACE + i] = sided(hit.object, hit.entering), hit.face

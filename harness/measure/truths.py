@@ -168,6 +168,81 @@ TRUTHS = {
 }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of ray optics: by which observable it is asked for, in which scenes."""
+
+    name: str
+    observable: Observable
+    scenes: tuple[str, ...]
+    remark: str = ""
+
+
+QUANTITIES = (
+    Quantity("angle of refraction (Snell)", Observable.INTERNAL_ANGLE, ("snell-sweep",)),
+    Quantity("refraction of a vector", Observable.EXIT_POINT, ("ball-checkerboard", "cone-side"),
+             "skew rays, out of every plane of symmetry"),
+    Quantity("critical angle", Observable.CRITICAL_ANGLE, ("tir-critical-angle", "tir-limit")),
+    Quantity("total internal reflection", Observable.TIR, ("tir-critical-angle",)),
+    Quantity("Fresnel's R and T", Observable.REFLECTANCE,
+             ("fresnel-outside", "fresnel-inside", "fresnel-indices"),
+             "unpolarised, as renderers claim; that of polarised light is told beside it"),
+    Quantity("R_s alone", Observable.BREWSTER_REFLECTANCE, ("brewster-angle",),
+             "at Brewster's angle R_p is 0, and R is R_s / 2"),
+    Quantity("Brewster's angle", Observable.BREWSTER_ANGLE, ("brewster-angle",)),
+    Quantity("sideways shift of a slab", Observable.SLAB_OFFSET,
+             ("slab-offset", "slab-thin", "thin-face-offset", "immersed-slab")),
+    Quantity("axial shift of a slab", Observable.SLAB_OFFSET, ("slab-offset",),
+             "the sideways shift over sin(theta_i), which is the camera's and known exactly"),
+    Quantity("shift of a stack", Observable.STACK_OFFSET, ("stack-panes", "stack-cemented")),
+    Quantity("R of a slab, all reflections", Observable.TOTAL_REFLECTANCE, ("slab-all-light",)),
+    Quantity("T of a slab, all reflections", Observable.TOTAL_TRANSMITTANCE,
+             ("slab-all-light", "absorption-all-light", "recursion-depth"),
+             "per polarisation and then averaged: the distance to nature, told beside it"),
+    Quantity("absorption", Observable.TRANSMITTANCE,
+             ("absorption-beer-lambert", "absorption-ball", "tir-prism-coloured")),
+    Quantity("deviation of a prism", Observable.DEVIATION, ("prism-deviation", "polygon-prism")),
+    Quantity("minimum deviation", Observable.MINIMUM_DEVIATION, ("prism-deviation",)),
+    Quantity("first transmitting angle", Observable.FIRST_TRANSMITTING_ANGLE,
+             ("prism-deviation",)),
+    Quantity("deviation of a wedge", Observable.DEVIATION, ("wedge-thin",)),
+    Quantity("focal length of a ball", Observable.FOCAL_LENGTH, ("ball-focus",)),
+    Quantity("back focal length of a ball", Observable.BACK_FOCAL_LENGTH, ("ball-focus",)),
+    Quantity("real focus of a ball", Observable.FOCUS, ("ball-focus", "immersed-ball")),
+    Quantity("view through a ball: inversion, magnification", Observable.INVERSION,
+             ("ball-magnification", "ball-sand-meets-sea")),
+    Quantity("focal length of a thick lens", Observable.FOCAL_LENGTH,
+             ("lens-biconvex", "lens-biconcave", "lens-meniscus", "immersed-air-lens")),
+    Quantity("back focal length of a thick lens", Observable.BACK_FOCAL_LENGTH,
+             ("lens-plano-convex", "lens-plano-convex-turned"),
+             "the turned lens has the front focal length of the other"),
+    Quantity("spherical aberration", Observable.SPHERICAL_ABERRATION,
+             ("ball-focus", "lens-plano-convex", "lens-plano-convex-turned")),
+    Quantity("rainbows", Observable.RAINBOW_ANGLE, ("rainbow-primary", "rainbow-secondary")),
+    Quantity("n_F, n_d, n_C by Sellmeier", Observable.MINIMUM_DEVIATION,
+             ("dispersion-n-bk7", "dispersion-sf11"),
+             "a case per line; V_d = (n_d - 1) / (n_F - n_C) is made of the three"),
+    Quantity("chromatic shift", Observable.FOCAL_LENGTH,
+             ("dispersion-lens-shift", "dispersion-ball-shift")),
+    Quantity("apparent depth, tangential", Observable.TANGENTIAL_DEPTH, ("apparent-depth-pool",)),
+    Quantity("apparent depth, sagittal", Observable.SAGITTAL_DEPTH, ("apparent-depth-pool",)),
+    Quantity("corner cube", Observable.FOLDED_DIRECTION, ("retroreflector-corner-cube",)),
+    Quantity("TIR prisms", Observable.FOLDED_DIRECTION,
+             ("tir-prism-right-angle", "tir-prism-porro", "light-pipe-rod")),
+    Quantity("n^2 law of radiance", Observable.TRANSMITTANCE, ("n2-camera-in-glass",)),
+    Quantity("etendue", Observable.TRANSMITTANCE, ("n2-camera-in-glass",),
+             "n^2 dA cos(theta) dOmega is kept where radiance / n^2 is, as some renderers claim"),
+    Quantity("optical path length (Fermat)", Observable.OPTICAL_LENGTH,
+             ("fermat-slab", "lens-biconvex", "cartesian-ellipsoid")),
+    Quantity("aplanatic points of a sphere", Observable.APLANATIC_IMAGE, ("aplanatic-sphere",)),
+    Quantity("Cartesian surfaces", Observable.CARTESIAN_FOCUS,
+             ("cartesian-ellipsoid", "cartesian-hyperboloid")),
+    Quantity("reversibility", Observable.REVERSIBILITY, ("reversibility-prism",)),
+    Quantity("energy: R + T + A = 1", Observable.RADIANCE, ("furnace-ball", "furnace-prism")),
+    Quantity("convergence of polygons", Observable.TESSELLATION_ERROR, ("polygon-icosphere",)),
+)  # fmt: skip
+
+
 def page() -> str:
     """docs/truths.md: all of them."""
     lines = [
@@ -189,4 +264,18 @@ def page() -> str:
     for observable, truth in TRUTHS.items():
         cells = (f"`{observable}`", truth.form, truth.derived, truth.domain, truth.condition)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    lines += [
+        "",
+        "## Where each quantity is asked for",
+        "",
+        "What ray optics has closed forms of, and the scenes that measure it.",
+        "",
+        "| quantity | observable | scenes | |",
+        "|--|--|--|--|",
+    ]
+    for quantity in QUANTITIES:
+        scenes = ", ".join(f"`{name}`" for name in quantity.scenes)
+        lines.append(
+            f"| {quantity.name} | `{quantity.observable}` | {scenes} | {quantity.remark} |"
+        )
     return "\n".join(lines) + "\n"

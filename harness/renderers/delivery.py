@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,12 @@ def delivered(
 
     A single NaN or infinity fails the image: no later stage could give it a meaning.
     """
-    if not path.exists():
-        raise RendererFailed("wrote no image", log=log)
+    try:
+        kind = path.lstat().st_mode
+    except OSError as error:
+        raise RendererFailed("wrote no image", log=log) from error
+    if not stat.S_ISREG(kind):  # a pipe would be waited for, and a link leads anywhere
+        raise RendererFailed("wrote something else than a file as its image", log=log)
     try:
         pixels, info = imagefile.read(path, encoding=encoding, size=(film.width, film.height))
     except InputError as error:

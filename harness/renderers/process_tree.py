@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import os
 import signal
 import subprocess
@@ -71,6 +72,31 @@ class Running:
                 tree.kill()
 
 
+class _Pids:
+    """All processes of the machine, listed once for all trees that ask at about the same time."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """After a fork, too: a thread that is lost may have held the lock."""
+        self._lock = threading.Lock()
+        self._found: set[int] = set()
+        self._when = -math.inf
+
+    def listed(self, seconds: float) -> set[int]:
+        """As of no more than `seconds` ago; not for the caller to change."""
+        with self._lock:
+            if time.monotonic() - self._when >= seconds:
+                self._when = time.monotonic()
+                self._found = set(psutil.pids())
+            return self._found
+
+
+_PIDS = _Pids()
+os.register_at_fork(after_in_child=_PIDS.forget)
+# How old a list of processes may be when memory is added up: half of the time between two looks.
+LISTED_S = 0.025
 _RUNNING: ContextVar[Running | None] = ContextVar("running", default=None)
 
 
@@ -92,7 +118,7 @@ class ProcessTree:
 
     def resident_mb(self) -> float:
         """Resident memory of all members in MiB; pages that they share are counted for each."""
-        self._find_members()
+        self._find_members(LISTED_S)
         total = 0
         for member in self._members.values():
             with contextlib.suppress(psutil.Error):
@@ -123,8 +149,9 @@ class ProcessTree:
                 time.sleep(0.002)
         self.ended = True
 
-    def _find_members(self) -> None:
-        pids = set(psutil.pids())
+    def _find_members(self, seconds: float = 0.0) -> None:
+        """From a list of processes that is up to `seconds` old."""
+        pids = _PIDS.listed(seconds)
         self._strangers &= pids
         for pid in pids - self._before - self._strangers - self._members.keys():
             if self._is_member(pid):

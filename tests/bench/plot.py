@@ -40,12 +40,17 @@ def _ratios(axes: Any, figures: Mapping[str, Any], goals: Mapping[str, float]) -
     for place, name in zip(places, names, strict=True):
         axes.plot([goals[name]] * 2, [place - 0.4, place + 0.4], color=GOAL, linewidth=3)
         ratio = figures[name]["ratio"]
-        axes.annotate(f"  {ratio:.4g}", (max(ratio, goals[name]), place), va="center")
+        axes.annotate(f"  {_shown(ratio)}", (max(ratio, goals[name]), place), va="center")
     axes.set_yticks(places, [name.replace("_", " ").replace(".", "\n") for name in names])
     axes.invert_yaxis()
     axes.set_xscale("log")
     axes.margins(x=0.2)
     axes.set_title("Ratios; grey: the goals")
+
+
+def _shown(ratio: float) -> str:
+    """With three digits that count, and never as a power of ten."""
+    return f"{ratio:,.0f}" if ratio >= 1000.0 else f"{ratio:.3g}"
 
 
 def _curve(

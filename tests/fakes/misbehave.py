@@ -156,6 +156,16 @@ def text(output: Path, width: int, height: int) -> None:
     output.write_text("an image, honestly")
 
 
+def pipe(output: Path, width: int, height: int) -> None:
+    """Whoever opens it waits for a writer, for ever."""
+    os.mkfifo(output)
+
+
+def link(output: Path, width: int, height: int) -> None:
+    """Leads to a file that was never an image of the renderer's."""
+    output.symlink_to(__file__)
+
+
 def none(output: Path, width: int, height: int) -> None:
     print("done")
 
@@ -191,6 +201,8 @@ MODES: dict[str, Callable[[Path, int, int], None]] = {
         nan,
         wrong_type,
         text,
+        pipe,
+        link,
         none,
     )
 }

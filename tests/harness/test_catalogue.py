@@ -14,8 +14,15 @@ import pytest
 from harness.data import scenes_root
 from harness.judging.judge import CaseJudge
 from harness.judging.results import Contender, Result, Results
-from harness.measure.observables import IMAGE_OBSERVABLES, TRUTH_OBSERVABLES, Observable
-from harness.measure.truths import TRUTHS, page
+from harness.measure.observables import (
+    ALL_LIGHT_OBSERVABLES,
+    IMAGE_OBSERVABLES,
+    LIGHT_OBSERVABLES,
+    TRUTH_OBSERVABLES,
+    Observable,
+)
+from harness.measure.statistics import SUITE_CHECKS
+from harness.measure.truths import QUANTITIES, TRUTHS, Quantity, page
 from harness.plan import Form, PreparedCase, light_role, prepare, trace_role
 from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Verdict
@@ -151,6 +158,22 @@ def test_every_case_names_its_truth_and_its_sources(name: str) -> None:
             assert check.against == "renderers" or check.against in registry.available()
 
 
+@pytest.mark.parametrize("quantity", QUANTITIES, ids=lambda q: q.name)
+def test_every_quantity_is_asked_for_where_the_page_says(quantity: Quantity) -> None:
+    assert quantity.scenes
+    for name in quantity.scenes:
+        asked = {check.observable for check in first_cases()[name].model.checks}
+        assert quantity.observable in asked
+
+
+def test_no_observable_of_the_truth_is_left_out_of_the_quantities() -> None:
+    """But for what all scenes ask for, or a renderer's two ways of telling the same."""
+    everywhere = {
+        Observable.EXIT_DIRECTION, Observable.VARIANT_AGREEMENT, Observable.RAY_AGREEMENT
+    }  # fmt: skip
+    assert {q.observable for q in QUANTITIES} == TRUTH_OBSERVABLES - everywhere
+
+
 def test_the_page_of_truths_is_made_of_them() -> None:
     """Of every observable that has a truth. Write it with `print(truths.page(), end="")`."""
     assert set(TRUTHS) == TRUTH_OBSERVABLES
@@ -163,3 +186,11 @@ def test_the_catalogue_is_as_large_as_it_says() -> None:
     assert len(cases) >= 80
     assert len({case.model.family for case in cases}) >= 18
     assert len(scene_files(scenes_root())) >= 40
+
+
+def test_the_level_of_a_suite_is_that_of_the_whole_catalogue() -> None:
+    """It allows for so many sampled checks; any of light or of a picture may be one."""
+    sampled = IMAGE_OBSERVABLES | LIGHT_OBSERVABLES | ALL_LIGHT_OBSERVABLES
+    cases = [case for path in scene_files(scenes_root()) for case in load_cases(path)]
+    checks = [check for case in cases for check in case.model.checks]
+    assert 0 < sum(Observable(check.observable) in sampled for check in checks) <= SUITE_CHECKS

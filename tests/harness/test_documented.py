@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from harness.data import scenes_root
 from harness.judging.documented import is_documented, known_here, known_in_run
 from harness.judging.explain import explain_run, unfitted
 from harness.plan import prepare
 from harness.record import Check, Diagnosis, SummaryCase, Verdict
 from harness.run import run
-from harness.scene.load import find
+from harness.scene.load import find, load_cases, scene_files
 from tests.fakes.student import student
 from tests.harness.tiny import SCENES
 from tests.mutants.test_outside_mutants import off_by
@@ -110,3 +111,15 @@ def test_what_no_single_ray_shows_is_said_to_have_no_cause_fitted() -> None:
     (found,) = explain_run([], [case("a", off, diagnoses=(alone,))], {"ember": ""})
     assert found.sentence.startswith("ember is off in exit_point, and no single")
     assert found.unexplained == ["a"]
+
+
+def test_no_documented_cause_can_vanish_unseen() -> None:
+    """Each has a check that FAILs when it is gone: a least size above 0 in some permutation."""
+    strict: dict[tuple[str, str], bool] = {}
+    for path in scene_files(scenes_root()):
+        for loaded in load_cases(path):
+            for known in (k for spec in loaded.model.checks for k in spec.known):
+                cause = (known.renderer, known.cause)
+                strict[cause] = strict.get(cause, False) or known.at_least > 0
+    assert [cause for cause, held in strict.items() if not held] == []
+    assert len(strict) >= 8

@@ -182,6 +182,19 @@ def _limit_data(found: Limit) -> dict[str, Any]:
     }  # fmt: skip
 
 
+# Held by test_trials.py.
+RIM_LINES = [
+    "## What rays alone do not see",
+    "",
+    "At the rim of a ball what is reflected goes on to the backdrop behind it, so two codes share",
+    "a pixel, and its ray is not measured but counted as mixed. `far-root` of 0.1, which goes",
+    "wrong where the cosine of incidence is below 0.1, touches no other ray: the probes of",
+    "`tests/mutants/scenes` pass it. Where pictures are compared, as in `ball-checkerboard`, the",
+    "rim shows it, by a thousand times the tolerance.",
+    "",
+]
+
+
 def document(data: dict[str, Any]) -> str:
     """docs/detection.md."""
     mutants, rules = data["mutants"], list(RIVALS)
@@ -226,7 +239,7 @@ def document(data: dict[str, Any]) -> str:
     seen_by = {rule: sum(bool(data["rivals"][m["name"]][rule]) for m in mutants) for rule in rules}
     counts = ", ".join(f"{rule} {count}" for rule, count in seen_by.items())
     lines += ["", f"Seen of {len(mutants)}: snellcheck {caught}, {counts}.", ""]
-    lines += _limit_lines(data) + _alarm_lines(data)
+    lines += _limit_lines(data) + RIM_LINES + _alarm_lines(data)
     return "\n".join(lines) + "\n"
 
 

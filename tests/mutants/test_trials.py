@@ -10,8 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from harness.data import scenes_root
 from harness.diagnosis.library import BY_ID
-from tests.mutants.mutants import CLEAN, CONTROLS, MUTANTS, UNLISTED, Mutant
+from harness.plan import prepare
+from harness.record import Verdict
+from harness.renderers import registry
+from harness.run import run
+from harness.scene.load import find
+from tests.mutants.mutants import CLEAN, CONTROLS, MUTANTS, UNLISTED, Mutant, outside_renderer
 from tests.mutants.trial import cases, trial
 
 
@@ -83,3 +89,19 @@ def test_a_fault_on_no_list_is_seen_and_not_named(
     assert found.caught
     assert found.cause is None
     assert "none of the known causes fits" in found.sentence
+
+
+def test_the_picture_shows_what_mixed_rays_at_a_rim_do_not(tmp_path: Path) -> None:
+    """`RIM_LINES` of the document: rays that graze a ball meet its far side first."""
+    wrong = outside_renderer(Mutant("far-root", 0.1, (None,)), tmp_path)
+    chosen = [prepare(c) for c in find(["ball-checkerboard"], scenes_root(), "draft")]
+    tracer = registry.create("tracer")
+    summary = run(chosen, [wrong, tracer], tracer, tmp_path / "out", quality="draft")
+    of_it = [c for case in summary.cases for c in case.checks if c.renderer == "mutant"]
+    status = {c.observable: c.status for c in of_it}
+    assert status["exit_point"] is Verdict.PASS
+    assert status["max_difference"] is Verdict.FAIL
+    off = next(c for c in of_it if c.observable == "max_difference")
+    assert off.value is not None
+    assert off.tolerance is not None
+    assert off.value > 100 * off.tolerance

@@ -136,6 +136,8 @@ def test_what_a_command_is_given(tmp_path: Path) -> None:
         ("wrong-size", "wrong image size; got 9 x 8; expected 8 x 8", ""),
         ("wrong-type", "wrong type of values; got object", ""),
         ("text", "not an image", ""),
+        ("pipe", "wrote something else than a file as its image", ""),
+        ("link", "wrote something else than a file as its image", ""),
         ("nan", "wrote NaN or infinity in 1 pixels", ""),
         ("none", "wrote no image", "done"),
         ("leak", "more than 200 MB of memory", ""),

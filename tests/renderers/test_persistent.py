@@ -261,6 +261,7 @@ def test_a_program_that_is_not_there(make) -> None:
         ("wrong-size", RendererFailed, "got 9 x 8; expected 8 x 8"),
         ("wrong-type", RendererFailed, "wrong type of values; got object"),
         ("text", RendererFailed, "not an image"),
+        ("pipe", RendererFailed, "something else than a file"),
         ("nan", RendererFailed, "NaN or infinity in 1 pixels"),
         ("none", RendererFailed, "fake answered 'done'"),
     ],

@@ -42,6 +42,8 @@ ONE_SHOT = {
     "nan": "wrote NaN or infinity in 1 pixels",
     "wrong-type": "wrong type of values; got object",
     "text": "not an image",
+    "pipe": "something else than a file",
+    "link": "something else than a file",
     "none": "wrote no image",
 }
 # What only some systems can refuse, and what it takes.
@@ -67,6 +69,8 @@ PERSISTENT = {
     "nan": "wrote NaN or infinity in 1 pixels",
     "wrong-type": "wrong type of values; got object",
     "text": "not an image",
+    "pipe": "something else than a file",
+    "link": "something else than a file",
     "none": "answered 'done",
     "babble": "answered 'Rendering, 10%",
     "other-id": "answered request",

@@ -53,7 +53,7 @@ def one_by_one(scene: Arrays, wave: Wave, t: Any, others: Any, stack: Any) -> No
     for i in range(N):
         o, d = vec_of(floats, ORIGIN, i), vec_of(floats, DIRECTION, i)
         (left, inward), left_face = side_of(ints[LEFT + i]), ints[LEFT_FACE + i]
-        hit = nearest_hit(scene, o, d, ints[MEDIUM + i], left, left_face, inward, stack)
+        hit = nearest_hit(scene, o, d, ints[MEDIUM + i], left, left_face, inward, stack[:0], stack)
         t[i] = hit.t
         others[0, i], others[1, i] = 2 * hit.object + hit.entering, hit.face
         others[2, i], others[3, i] = hit.medium, hit.beyond
