@@ -14,7 +14,7 @@ import numpy as np
 
 from harness import __version__, plan, record
 from harness.documents import PARTIAL
-from harness.errors import RendererError, RendererFailed, utf8
+from harness.errors import ImageNotFinite, RendererError, RendererFailed, utf8
 from harness.judging.judge import Judgement
 from harness.judging.results import Contender, Results
 from harness.measure.images import Pixels
@@ -262,7 +262,8 @@ def _means(pixels: Pixels, second: object, role: str) -> tuple[list[float], list
     The difference of the two has twice the variance of one; with N pixels of independent noise the
     mean of one has the standard error sqrt(mean square of the difference / 2 / N).
     """
-    if role != plan.IMAGE:  # views of probes show as not finite what was not measured
+    # Views of probes show as not finite what was not measured.
+    if role != plan.IMAGE or not np.isfinite(pixels).all():
         return [], []
     mean = pixels.mean(axis=(0, 1), dtype=np.float64)
     if not isinstance(second, Image) or second.pixels.shape != pixels.shape:
@@ -285,9 +286,14 @@ def _cut(result: object) -> float | None:
 
 
 def _shown(case: PreparedCase, mine: Mapping[str, object]) -> Iterator[tuple[str, Pixels]]:
-    """The picture worth keeping, by role: the scene's own, or how its first probe looks."""
+    """The picture worth keeping, by role: the scene's own, or how its first probe looks.
+
+    One that is not finite is kept as well: where it is not, is what one wants to see.
+    """
     image = mine.get(plan.IMAGE)
-    if isinstance(image, Image):
+    if isinstance(image, ImageNotFinite) and image.image is not None:
+        yield plan.IMAGE, image.image
+    elif isinstance(image, Image):
         yield plan.IMAGE, image.pixels
     elif case.loaded.model.probes:
         probe = case.probe(None)

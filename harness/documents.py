@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TypeVar
 
@@ -29,18 +30,23 @@ class Model(BaseModel):
 PARTIAL = re.compile(r"\..+\.[a-z0-9_]{8}")
 
 
-def write_bytes(path: Path, data: bytes) -> None:
-    """Writes all of `data` or nothing: to a temporary name beside `path`, then renamed."""
+def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
+    """Writes all of `pieces` or nothing: to a temporary name beside `path`, then renamed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(data)
+            file.writelines(pieces)
         Path(name).chmod(0o644)
         os.replace(name, path)
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Writes all of `data` or nothing, like `write_pieces`."""
+    write_pieces(path, (data,))
 
 
 def write_text(path: Path, text: str) -> None:

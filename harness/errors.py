@@ -9,6 +9,11 @@ import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 LONGEST_TEXT = 600
 
@@ -109,10 +114,21 @@ class RendererFailed(RendererError):
 
 
 class ImageNotFinite(RendererFailed):
-    """An image holds NaN or infinity: ERROR. `pixels` are where, row by row from the top left."""
+    """An image holds NaN or infinity: ERROR. `pixels` are where, row by row from the top left.
 
-    def __init__(self, pixels: Iterable[int], *, width: int, log: str = "") -> None:
-        self.pixels, self.width = tuple(pixels), width
+    `image` (height, width, 3) is all of it, where it is at hand: nothing is measured in it, but it
+    can be looked at.
+    """
+
+    def __init__(
+        self,
+        pixels: Iterable[int],
+        *,
+        width: int,
+        log: str = "",
+        image: NDArray[np.floating] | None = None,
+    ) -> None:
+        self.pixels, self.width, self.image = tuple(pixels), width, image
         y, x = divmod(self.pixels[0], width)
         message = f"wrote NaN or infinity in {len(self.pixels)} pixels, first at ({x}, {y})"
         super().__init__(message, log=log)

@@ -13,6 +13,7 @@ from pydantic import ConfigDict, Field
 
 from harness.documents import Model, read
 from harness.documents import write_bytes as write_bytes  # for those who write beside records
+from harness.documents import write_pieces as write_pieces
 from harness.documents import write_text as write_text
 from harness.outcomes import SEVERITY as SEVERITY
 from harness.outcomes import AgainstBaseline as AgainstBaseline
@@ -174,11 +175,15 @@ class RendererRun(Model):
 
 
 class Series(Model):
-    """One line of a chart. `renderer` is a renderer's name or "truth"."""
+    """One line of a chart. `renderer` is a renderer's name or "truth".
+
+    Of residuals, `tolerance` is what this renderer may be off by at each x.
+    """
 
     renderer: str
     x: list[float]
     y: list[float]
+    tolerance: list[float] = Field(default_factory=list)
 
 
 class RayPath(Model):
@@ -197,7 +202,8 @@ class RayPath(Model):
 class Curve(Model):
     """A measured curve beside its truth, with what is left when truth is taken away.
 
-    `tolerance` (same length as residual x) draws the band within which residuals must lie.
+    `tolerance` (same length as residual x) draws the band within which residuals must lie, which is
+    the widest of all renderers where they have tolerances of their own.
     """
 
     id: str

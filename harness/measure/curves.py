@@ -30,6 +30,7 @@ def curve_of_rows(
     if len(rows) > POINTS:
         rows = rows[np.linspace(0, len(rows) - 1, POINTS).astype(int)]
     x = np.degrees(truth.theta_i[rows]).tolist()
+    band = tolerance[rows].tolist()
     return Curve(
         id=title.lower().replace(" ", "-"),
         title=title,
@@ -40,6 +41,6 @@ def curve_of_rows(
             Series(renderer="", x=x, y=value[rows].tolist()),
         ],
         residual_label="measured − truth",
-        residuals=[Series(renderer="", x=x, y=(value - true)[rows].tolist())],
-        tolerance=tolerance[rows].tolist(),
+        residuals=[Series(renderer="", x=x, y=(value - true)[rows].tolist(), tolerance=band)],
+        tolerance=band,
     )

@@ -34,7 +34,7 @@ def delivered(
         raise RendererFailed(f"wrote an unusable image: {text}", log=log) from error
     if info.nonfinite:
         where = np.flatnonzero(~np.isfinite(pixels).all(axis=2))
-        raise ImageNotFinite(where.tolist(), width=film.width, log=log)
+        raise ImageNotFinite(where.tolist(), width=film.width, log=log, image=pixels)
     return pixels, info
 
 

@@ -10,24 +10,26 @@ import hashlib
 import importlib.resources
 import json
 import re
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
-
 from harness import record as records
 from harness.errors import InputError
-from harness.record import CaseRecord, Summary, SummaryCase, Verdict
+from harness.record import CaseRecord, Verdict
 from harness.report import changes, chart, checks, mathml, overview, quantity, view
 from harness.report.colours import BEYOND, NOT_FINITE, SCALE_HEX, colour_classes
 from harness.report.detection import detection
 from harness.report.differences import differences
+from harness.report.digest import Place, digest_of
 from harness.report.given import given_files
-from harness.report.links import RunFolder, clean, page_name, url
+from harness.report.links import RunFolder, breakable, clean, page_name, url
 from harness.report.pagedata import case_data
+from harness.report.spool import Spool
 from harness.report.trends import Trends
+from harness.summary_file import SummaryFile
 
 if TYPE_CHECKING:
     import jinja2
@@ -45,15 +47,15 @@ def write_report(run_folder: Path) -> Path:
     Reads `summary.json` and `records/*.json`. Raises InputError where the summary is missing or
     unreadable; a case whose record is, is listed with the reason.
     """
-    summary = records.read_summary(run_folder / "summary.json")
-    report = _Report(run_folder, summary)
+    report = _Report(run_folder, SummaryFile(run_folder / "summary.json"))
     for name in ASSETS:
         text = importlib.resources.files(PACKAGE).joinpath("assets", name).read_text("utf-8")
         records.write_text(run_folder / "assets" / name, text)
-    rows = report.write_cases()
-    _remove_stale(run_folder / "cases", {page_name(case.id) for case in summary.cases})
     index = run_folder / "index.html"
-    records.write_text(index, report.index(rows))
+    with tempfile.TemporaryFile() as file:
+        rows = report.write_cases(Spool(file))
+        _remove_stale(run_folder / "cases", {page_name(row.id) for row in report.order})
+        records.write_pieces(index, (part.encode("utf-8") for part in report.index(rows)))
     return index
 
 
@@ -78,14 +80,16 @@ class Neighbours:
 class _Report:
     """What all pages of one run share."""
 
-    def __init__(self, run_folder: Path, summary: Summary) -> None:
+    def __init__(self, run_folder: Path, file: SummaryFile) -> None:
         self.folder = run_folder
         self.top, self.below = RunFolder(run_folder), RunFolder(run_folder, up="../")
-        self.summary = summary
-        self.order = view.case_order(summary)
+        self.file = file
+        self.summary = summary = file.head
+        self.digest = digest_of(file)
+        self.order = self.digest.order()
         self.place = {case.id: k for k, case in enumerate(self.order)}
         self.next_failing = _next_failing(self.order)
-        self.renderers = view.renderer_names(summary)
+        self.renderers = view.renderer_names(summary, self.digest)
         self.colours = colour_classes(self.renderers)
         self.trends = Trends(self.renderers, self.colours)
         self.code = _own_digest()
@@ -102,9 +106,8 @@ class _Report:
             not_finite="#{:02x}{:02x}{:02x}".format(*NOT_FINITE),
         )
 
-    def write_cases(self) -> list[view.Line]:
+    def write_cases(self, spool: Spool) -> list[view.Line]:
         """Writes a page per record, and returns the index's rows in their order."""
-        cases = {case.id: case for case in self.order}
         rows: dict[str, view.Line] = {}
         problems: list[str] = []
         for path in sorted((self.folder / "records").glob("*.json")):
@@ -113,12 +116,11 @@ class _Report:
             except InputError as error:
                 problems.append(f"{path.name}: {error.problems[0].message}")
                 continue
-            case = cases.get(record.id)
-            if case is None:
+            if record.id not in self.place:
                 self.stray.append(path.name)
                 continue
-            self._write_case(self._page_path(case), record, path)
-            rows[case.id] = self._row(case, record, "")
+            self._write_case(self._page_path(record.id), record, path)
+            rows[record.id] = self._row(record.id, record, "", spool)
             for curve in record.curves:
                 self.trends.add(curve)
         missing = "no readable record of this case"
@@ -126,19 +128,20 @@ class _Report:
             missing += " (unreadable: " + "; ".join(problems[:3]) + ")"
         for case in self.order:
             if case.id not in rows:
-                self._page_path(case).unlink(missing_ok=True)
-                rows[case.id] = self._row(case, None, missing)
+                self._page_path(case.id).unlink(missing_ok=True)
+                rows[case.id] = self._row(case.id, None, missing, spool)
         return [rows[case.id] for case in self.order]
 
-    def _page_path(self, case: SummaryCase) -> Path:
-        return self.folder / "cases" / page_name(case.id)
+    def _page_path(self, case_id: str) -> Path:
+        return self.folder / "cases" / page_name(case_id)
 
-    def _row(self, case: SummaryCase, record: CaseRecord | None, note: str) -> view.Line:
-        page = f"cases/{url(page_name(case.id))}" if record else None
+    def _row(self, case_id: str, record: CaseRecord | None, note: str, spool: Spool) -> view.Line:
+        page = f"cases/{url(page_name(case_id))}" if record else None
+        case = self.file.case(self.order[self.place[case_id]].span)
         row = view.row(
             case, record, self.renderers, self.colours, self.top, page=page, note=clean(note)
         )
-        return view.line(row, Markup(self.row_template.render(row=row, absent=self.absent)))
+        return view.line(row, spool.keep(self.row_template.render(row=row, absent=self.absent)))
 
     def _write_case(self, page: Path, record: CaseRecord, path: Path) -> None:
         """Writes the page of a case, or only names the run in it where all else is as it was."""
@@ -181,7 +184,7 @@ class _Report:
             formula=mathml.typeset(record.formula),
             checks=checks.grouped(views),
             change_of=changes.change,
-            diagnoses=checks.ranked(record.diagnoses, record.checks),
+            diagnoses=checks.ranked(record.diagnoses, checks.failing(record.checks)),
             worst_of={v.check.renderer: v for v in reversed(views)},
             last_words={run.name: view.last_words(run) for run, _, _ in runs},
             elsewhere={run.name: checks.elsewhere(run.name, record.checks) for run, _, _ in runs},
@@ -208,15 +211,16 @@ class _Report:
         failing = self.next_failing[at]
         return Neighbours(link(at - 1), link(at + 1), link(failing), at + 1, len(ids))
 
-    def index(self, rows: list[view.Line]) -> str:
+    def index(self, rows: list[view.Line]) -> Iterator[str]:
+        """The index page, part after part."""
         families = sorted({row.family for row in rows})
         statuses = [v.value for v in records.SEVERITY if any(row.status == v for row in rows)]
-        verdict = overview.headline(self.summary)
-        return self.environment.get_template("index.html.j2").render(
+        verdict = overview.headline(self.summary, self.digest)
+        return self.environment.get_template("index.html.j2").generate(
             headline=verdict,
-            tally=overview.tally(self.summary),
+            tally=overview.tally(self.digest.counts),
             started=overview.started(self.summary),
-            lines=overview.renderer_lines(self.summary, self.renderers, rows),
+            lines=overview.renderer_lines(self.summary, self.digest, self.renderers, rows),
             rows=rows,
             families=families,
             statuses=statuses,
@@ -224,12 +228,10 @@ class _Report:
             exit_meaning=overview.EXIT_CODES.get(self.summary.exit_code, "unknown"),
             stray=self.stray,
             verdicts=[verdict.value for verdict in Verdict],
-            diagnoses=checks.ranked(
-                self.summary.diagnoses, (c for case in self.summary.cases for c in case.checks)
-            ),
+            diagnoses=checks.ranked(self.summary.diagnoses, self.digest.failing()),
             changed=changes.panel(self.summary.baseline),
             changes=_change_chips(rows),
-            failures=overview.failures(self.summary),
+            failures=overview.failures(self.digest),
             pages={row.id: row.page for row in rows},
             trends=self.trends.panels(self.summary),
             detection=detection(),
@@ -237,7 +239,7 @@ class _Report:
         )
 
 
-def _next_failing(order: list[SummaryCase]) -> list[int | None]:
+def _next_failing(order: list[Place]) -> list[int | None]:
     """For each case the place of the next one after it that fails."""
     found: list[int | None] = []
     ahead: int | None = None
@@ -298,6 +300,7 @@ def environment() -> jinja2.Environment:
     )
     environment.filters.update(
         clean=clean,
+        breakable=breakable,
         number=quantity.number,
         seconds=quantity.seconds,
         count=quantity.count,

@@ -39,7 +39,7 @@ SHAPES = {
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the legend. `used` is the worst |residual| relative to the tolerance there."""
+    """A line of the legend. `used` is the worst |residual| relative to its own tolerance there."""
 
     name: str
     colour: str
@@ -57,6 +57,7 @@ class Chart:
     legend: list[Entry]
     residual_label: str
     bent: bool  # the residuals' axis is logarithmic beyond the band
+    widest: bool  # the band is the widest of the renderers', which have tolerances of their own
     x_axis: Axis
 
 
@@ -77,7 +78,8 @@ def draw(curve: Curve, colours: Mapping[str, str]) -> Chart:
         '<svg class="chart" viewBox="0 0 {} {}" role="img" aria-label="{}">\n{}\n</svg>'
     ).format(WIDTH, bottom + 44, label, Markup("\n").join(parts))
     legend = [_entry(s, curve, colours) for s in curve.series]
-    return Chart(clean(curve.title), svg, legend, clean(curve.residual_label), bent, x_axis)
+    widest = len({tuple(s.tolerance) for s in residuals}) > 1
+    return Chart(clean(curve.title), svg, legend, clean(curve.residual_label), bent, widest, x_axis)
 
 
 def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup | None:
@@ -88,7 +90,8 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
     width, height = 96, 60
     xs = [x for x in residual.x if drawable(x)]
     x_axis = spanning(xs or [0.0, 1.0], 1, width - 1, 0.0)
-    band = max((t for t in curve.tolerance if drawable(t)), default=0.0)
+    own = residual.tolerance or curve.tolerance
+    band = max((t for t in own if drawable(t)), default=0.0)
     values = [y for y in residual.y if drawable(y)]
     y_axis = for_residuals(values, band, height - 1, 1)
     points = list(zip(residual.x, residual.y, strict=False))
@@ -96,7 +99,7 @@ def sparkline(curve: Curve, renderer: str, colours: Mapping[str, str]) -> Markup
     placed = [_placed(run, x_axis, y_axis) for run in runs]
     step = max(1, len(residual.x) // 8)
     few = [*range(0, len(residual.x) - 1, step), len(residual.x) - 1]
-    tolerance = [curve.tolerance[k] for k in few if k < len(curve.tolerance)]
+    tolerance = [own[k] for k in few if k < len(own)]
     return Markup(
         '<svg class="spark {}" viewBox="0 0 {} {}" role="img" aria-label="{}">'
         '<path class="band" d="{}"/><path class="line" d="{}"/></svg>'
@@ -282,7 +285,8 @@ def _path(points: Sequence[Point]) -> str:
 
 def _entry(series: Series, curve: Curve, colours: Mapping[str, str]) -> Entry:
     residual = next((r for r in curve.residuals if r.renderer == series.renderer), None)
-    worst, used = _worst(residual, curve.tolerance) if residual else (None, None)
+    own = (residual.tolerance or curve.tolerance) if residual else []
+    worst, used = _worst(residual, own) if residual else (None, None)
     lost = sum(not drawable(y) for y in series.y)
     colour = colours.get(series.renderer, "c7")
     return Entry(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 
 from harness.measure.observables import Observable
@@ -162,8 +162,25 @@ def elsewhere(renderer: str, checks: Iterable[Check]) -> str:
     return ", ".join(dict.fromkeys(clean(name) for names in off for name in names))
 
 
-def ranked(diagnoses: Sequence[Diagnosis], checks: Iterable[Check]) -> list[tuple[str, Diagnosis]]:
+def who_is_off(check: Check) -> str:
+    """Who is off where a check fails: of two that differ perhaps the other one."""
+    off = check.attribution.off if check.attribution else []
+    return check.renderer if check.renderer in off or not off else off[0]
+
+
+def failing(checks: Iterable[Check]) -> set[str]:
+    """The renderers that are off where a check is bad."""
+    return {who_is_off(check) for check in checks if check.status in BAD}
+
+
+def ranked(diagnoses: Sequence[Diagnosis], failing: Container[str]) -> list[tuple[str, Diagnosis]]:
     """Diagnoses with the verdict whose colour they bear: of renderers that fail before the rest."""
-    failing = {c.renderer for c in checks if c.status in BAD}
-    toned = [("fail" if d.renderer in failing else "known", d) for d in diagnoses]
+    toned = [
+        ("fail" if d.renderer in failing and not _documented(d) else "known", d) for d in diagnoses
+    ]
     return sorted(toned, key=lambda item: item[0] != "fail")
+
+
+def _documented(diagnosis: Diagnosis) -> bool:
+    """Whether it is of a deviation that the scenes state."""
+    return diagnosis.cause is not None and diagnosis.cause.id == "documented"

@@ -10,6 +10,8 @@ import stat
 from pathlib import Path
 from urllib.parse import quote
 
+from markupsafe import Markup, escape
+
 CONTROL = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)")
 UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069]")
 
@@ -22,6 +24,11 @@ def clean(text: str) -> str:
     """
     text = CONTROL.sub("", text).replace("\r\n", "\n")
     return UNPRINTABLE.sub("\ufffd", text)
+
+
+def breakable(name: str) -> Markup:
+    """A name whose words are joined by "_", which may go on in the next line after each."""
+    return escape(name).replace("_", Markup("_<wbr>"))
 
 
 def page_name(case_id: str) -> str:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import groupby
 
-from harness.record import Check, RendererSummary, Summary, Verdict
-from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view
+from harness.record import RendererSummary, Summary, Verdict
+from harness.report.checks import FIRST_TO_LOOK_AT, CheckView
+from harness.report.digest import Digest
 from harness.report.links import clean
 from harness.report.quantity import count, number
 from harness.report.view import Line
@@ -39,25 +40,13 @@ class Headline:
     worst_case: str = ""
 
 
-def headline(summary: Summary) -> Headline:
-    counts = dict.fromkeys(Verdict, 0)
-    worst: tuple[tuple[int, float], str, CheckView] | None = None
-    closest: tuple[float, str, CheckView] | None = None
-    for case in summary.cases:
-        for check in case.checks:
-            counts[check.status] += 1
-            view = check_view(check)
-            if check.status in BAD:
-                if worst is None or view.rank < worst[0]:
-                    worst = view.rank, case.id, view
-            elif check.status == Verdict.PASS and (ratio := view.ratio):
-                closest = (ratio, case.id, view) if not closest or ratio > closest[0] else closest
-    state, text = _sentence(summary, counts)
-    also = _also(summary, counts)
-    if worst:
-        return Headline(state, text, also, "Worst:", worst[2], worst[1])
-    if closest:
-        return Headline(state, text, also, "Closest to its limit:", closest[2], closest[1])
+def headline(summary: Summary, digest: Digest) -> Headline:
+    state, text = _sentence(summary, digest.counts)
+    also = _also(summary, digest.counts)
+    if worst := digest.worst:
+        return Headline(state, text, also, "Worst:", worst.view, worst.case)
+    if closest := digest.closest:
+        return Headline(state, text, also, "Closest to its limit:", closest.view, closest.case)
     return Headline(state, text, also)
 
 
@@ -74,38 +63,23 @@ class Failure:
     more: int
 
 
-def failures(summary: Summary) -> tuple[list[Failure], int]:
+def failures(digest: Digest) -> tuple[list[Failure], int]:
     """The worst check of each kind of failure, and how many kinds are left out.
 
     One fault of a renderer fails many checks: each of its observables that fail is one kind, and so
     is each reason for which it has no figures. Every renderer's first kind stands before any
     renderer's second, lest what fails most hide who fails at all.
     """
-    kinds: dict[tuple[str, str], list[tuple[tuple[int, float], str, CheckView]]] = {}
-    for case in summary.cases:
-        for check in case.checks:
-            if check.status in BAD:
-                view = check_view(check)
-                kind = check.observable if check.status is Verdict.FAIL else check.reason
-                kinds.setdefault((_who(check), kind), []).append((view.rank, case.id, view))
-    worst = [
-        (min(found, key=lambda f: f[0]), who, len(found) - 1) for (who, _), found in kinds.items()
-    ]
-    worst.sort(key=lambda item: item[0][0])
+    kinds = sorted(digest.kinds.items(), key=lambda item: item[1].worst.view.rank)
     turns: Counter[str] = Counter()
     in_turn: list[tuple[int, Failure]] = []
-    for (_, case_id, view), who, more in worst:
-        in_turn.append((turns[who], Failure(clean(case_id), view, clean(who), more)))
+    for (who, _), kind in kinds:
+        failure = Failure(clean(kind.worst.case), kind.worst.view, clean(who), kind.count - 1)
+        in_turn.append((turns[who], failure))
         turns[who] += 1
     in_turn.sort(key=lambda item: item[0])
     shown = [failure for _, failure in in_turn[:MOST_FAILURES]]
-    return shown, max(0, len(worst) - MOST_FAILURES)
-
-
-def _who(check: Check) -> str:
-    """Who is off where a check fails: of two that differ perhaps the other one."""
-    off = check.attribution.off if check.attribution else []
-    return check.renderer if check.renderer in off or not off else off[0]
+    return shown, max(0, len(kinds) - MOST_FAILURES)
 
 
 def _sentence(summary: Summary, counts: Mapping[Verdict, int]) -> tuple[str, str]:
@@ -139,7 +113,7 @@ def _also(summary: Summary, counts: Mapping[Verdict, int]) -> list[str]:
             f"{count(counts[Verdict.KNOWN], 'known deviation')} at the size the scenes document"
         )
     stated = summary.counts.model_dump(by_alias=True)
-    if any(stated[verdict.value] != n for verdict, n in counts.items()):
+    if any(stated[verdict.value] != counts[verdict] for verdict in Verdict):
         notes.append("summary.json states other counts than its cases show")
     return notes
 
@@ -155,8 +129,7 @@ class Tally:
     shares: list[tuple[str, float, float]]
 
 
-def tally(summary: Summary) -> Tally:
-    counts = Counter(check.status for case in summary.cases for check in case.checks)
+def tally(counts: Mapping[Verdict, int]) -> Tally:
     everything = sum(counts.values())
     shares, start = [], 0.0
     for verdict in FIRST_TO_LOOK_AT:
@@ -184,15 +157,20 @@ def started(summary: Summary) -> str:
 class Mark:
     """A case in a renderer's strip; what is wrong stands taller, so that colour is not needed.
 
-    In long strips a mark stands for `span` cases of one verdict, from the `start`th on.
+    In long strips a mark stands for `span` cases of one verdict, from the `start`th on. It is low
+    where the renderer fails only in comparison with another that is off.
     """
 
     status: Verdict | None
-    height: int
+    excused: bool
     start: int
     span: int
     title: str
     page: str | None
+
+    @property
+    def height(self) -> int:
+        return EXCUSED if self.excused else HEIGHTS[self.status]
 
 
 HEIGHTS = {
@@ -203,6 +181,7 @@ HEIGHTS = {
     Verdict.ERROR: 18,
     None: 1,
 }
+EXCUSED = 8
 
 
 @dataclass(frozen=True)
@@ -222,23 +201,30 @@ class RendererLine:
 
 
 def renderer_lines(
-    summary: Summary, names: Sequence[str], rows: Sequence[Line]
+    summary: Summary, digest: Digest, names: Sequence[str], rows: Sequence[Line]
 ) -> list[RendererLine]:
-    return [_line(name, column, summary, rows) for column, name in enumerate(names)]
+    return [
+        _line(name, column, summary.renderers.get(name), digest.by_renderer.get(name), rows)
+        for column, name in enumerate(names)
+    ]
 
 
-def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> RendererLine:
-    known = summary.renderers.get(name)
+def _line(
+    name: str,
+    column: int,
+    known: RendererSummary | None,
+    counts: Counter[Verdict] | None,
+    rows: Sequence[Line],
+) -> RendererLine:
+    verdicts = counts or Counter()
     failed = sum(row.verdicts[column] is Verdict.ERROR for row in rows)
-    checks = [c for case in summary.cases for c in case.checks if c.renderer == name]
-    verdicts = Counter(check.status for check in checks)
     facts = known.facts if known else {}
     return RendererLine(
         name=name,
         version=clean(known.version) if known else "",
         ok=known is not None and known.status == "ok" and not failed,
         state=_state(known, failed, sum(row.verdicts[column] is not None for row in rows)),
-        reason=clean(known.reason) if known else "",
+        reason=clean(_unless_repeated(known.reason, known.remedy)) if known else "",
         remedy=clean(known.remedy) if known else "",
         facts=[
             (
@@ -249,10 +235,15 @@ def _line(name: str, column: int, summary: Summary, rows: Sequence[Line]) -> Ren
         ],
         strip=_strip(rows, column),
         tally=", ".join(f"{n} {verdict.value}" for verdict, n in verdicts.items()),
-        checks=len(checks),
+        checks=verdicts.total(),
         passed=verdicts[Verdict.PASS] + verdicts[Verdict.KNOWN],
         render_s=known.render_s if known else 0.0,
     )
+
+
+def _unless_repeated(reason: str, remedy: str) -> str:
+    """The reason without the command that stands below it anyway."""
+    return reason.removesuffix(remedy).rstrip(" :;") if remedy else reason
 
 
 def _state(known: RendererSummary | None, failed: int, asked: int) -> str:
@@ -271,18 +262,20 @@ def _strip(rows: Sequence[Line], column: int) -> list[Mark]:
     if len(rows) <= MOST_MARKS:
         return [_mark(row, column, k) for k, row in enumerate(rows)]
     found, start = [], 0
-    for status, group in groupby(row.verdicts[column] for row in rows):
+    for (status, excused), group in groupby((r.verdicts[column], r.excused[column]) for r in rows):
         span = len(list(group))
-        title = f"{count(span, 'case')}: {_word(status)}"
-        found.append(Mark(status, HEIGHTS[status], start, span, title, None))
+        title = f"{count(span, 'case')}: {_word(status, excused)}"
+        found.append(Mark(status, excused, start, span, title, None))
         start += span
     return found
 
 
 def _mark(row: Line, column: int, start: int) -> Mark:
-    status = row.verdicts[column]
-    return Mark(status, HEIGHTS[status], start, 1, f"{row.id}: {_word(status)}", row.page)
+    status, excused = row.verdicts[column], row.excused[column]
+    return Mark(status, excused, start, 1, f"{row.id}: {_word(status, excused)}", row.page)
 
 
-def _word(status: Verdict | None) -> str:
-    return status.value if status else "took no part"
+def _word(status: Verdict | None, excused: bool) -> str:
+    if excused:
+        return f"{status}, but another is off"
+    return status.value if status else "no checks of its own"

@@ -71,7 +71,7 @@ def embeddable(data: object) -> Markup:
 
 
 def _absent(run: RendererRun) -> dict[str, str]:
-    word = "crashed" if run.status == Verdict.ERROR else "no picture"
+    word = "failed" if run.status == Verdict.ERROR else "no picture"
     return {"name": clean(run.name), "word": word, "reason": clean(run.reason)}
 
 

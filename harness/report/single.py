@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
-from harness import record as records
 from harness.record import write_text
 from harness.report.build import write_report
+from harness.report.digest import digest_of
 from harness.report.links import page_name, url
-from harness.report.view import case_order
+from harness.summary_file import SummaryFile
 
 MEGABYTE = 1_000_000
 TYPES = {".webp": "image/webp", ".png": "image/png", ".jpg": "image/jpeg", ".svg": "image/svg+xml"}
@@ -40,10 +40,10 @@ def write_single(run_folder: Path, out: Path, room: int = 25 * MEGABYTE) -> Sing
     summary is missing or unreadable.
     """
     write_report(run_folder)
-    summary = records.read_summary(run_folder / "summary.json")
+    order = digest_of(SummaryFile(run_folder / "summary.json")).order()
     blocks: list[str] = []
     without: list[str] = []
-    for case in case_order(summary):
+    for case in order:
         page = run_folder / "cases" / page_name(case.id)
         if not page.is_file():
             continue

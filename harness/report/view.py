@@ -25,15 +25,16 @@ from harness.report.changes import Change, change
 from harness.report.chart import sparkline
 from harness.report.checks import (
     BAD,
-    FIRST_TO_LOOK_AT,
     CheckView,
-    check_view,
     elsewhere,
+    failing,
     ranked,
     sorted_views,
     told,
 )
+from harness.report.digest import Digest
 from harness.report.links import RunFolder, clean
+from harness.report.spool import Piece
 
 BROWSER_TYPES = (".png", ".webp", ".jpg", ".jpeg", ".gif", ".avif", ".svg")
 
@@ -134,12 +135,14 @@ class Line:
     page: str | None
     change: Change | None
     verdicts: tuple[Verdict | None, ...]
-    html: Markup
+    excused: tuple[bool, ...]  # of each renderer, whether only others are off where it fails
+    html: Piece
 
 
-def line(row: Row, html: Markup) -> Line:
+def line(row: Row, html: Piece) -> Line:
     verdicts = tuple(cell.status for cell in row.cells)
-    return Line(row.id, row.family, row.status, row.page, row.change, verdicts, html)
+    excused = tuple(bool(cell.elsewhere) for cell in row.cells)
+    return Line(row.id, row.family, row.status, row.page, row.change, verdicts, excused, html)
 
 
 def split_id(case_id: str) -> tuple[str, list[tuple[str, str]]]:
@@ -185,7 +188,7 @@ def row(
 def _diagnoses(case: SummaryCase) -> list[tuple[str, str, str]]:
     return [
         (tone, d.renderer, told(d.renderer, d.sentence))
-        for tone, d in ranked(case.diagnoses, case.checks)
+        for tone, d in ranked(case.diagnoses, failing(case.checks))
     ]
 
 
@@ -279,21 +282,6 @@ def renderer_verdict(
     return worst(verdicts) if verdicts else None
 
 
-def case_order(summary: Summary) -> list[SummaryCase]:
-    """Failures first, worst first, then errors; otherwise as the run had them."""
-
-    def rank(case: SummaryCase) -> tuple[int, float]:
-        if case.status not in BAD:
-            return FIRST_TO_LOOK_AT.index(case.status), 0.0
-        views = (check_view(check).rank for check in case.checks)
-        return min(views, default=(FIRST_TO_LOOK_AT.index(case.status), 0.0))
-
-    return sorted(summary.cases, key=rank)
-
-
-def renderer_names(summary: Summary) -> list[str]:
+def renderer_names(summary: Summary, digest: Digest) -> list[str]:
     """Those the run knew, then any that only checks name."""
-    names = list(summary.renderers)
-    for case in summary.cases:
-        names += [check.renderer for check in case.checks if check.renderer not in names]
-    return list(dict.fromkeys(names))
+    return list(dict.fromkeys([*summary.renderers, *digest.by_renderer]))

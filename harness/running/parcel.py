@@ -75,7 +75,8 @@ def pack_result(result: Result) -> Parcel:
     """The parcel of an image, of ray paths, or of the error that stands in their place."""
     if isinstance(result, ImageNotFinite):
         where = {"pixels": list(result.pixels), "width": result.width}
-        return Parcel({"kind": "not finite", "log": result.log, **where}, {})
+        image = {} if result.image is None else {"image": result.image}
+        return _with_arrays({"kind": "not finite", "log": result.log, **where}, image)
     if isinstance(result, RendererError):
         kind = next(name for name, error in _ERRORS.items() if isinstance(result, error))
         return Parcel({"kind": kind, "message": str(result), "log": result.log}, {})
@@ -88,6 +89,10 @@ def pack_result(result: Result) -> Parcel:
     else:
         meta, names = {"kind": "paths"}, _PATHS
     arrays = {name: getattr(result, name) for name in names if getattr(result, name) is not None}
+    return _with_arrays(meta, arrays)
+
+
+def _with_arrays(meta: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Parcel:
     shapes = {name: [array.dtype.str, *array.shape] for name, array in arrays.items()}
     return Parcel(
         {**meta, "arrays": shapes}, {name: _packed(array) for name, array in arrays.items()}
@@ -97,14 +102,14 @@ def pack_result(result: Result) -> Parcel:
 def unpack_result(parcel: Parcel) -> Result:
     """The result that `pack_result` was given, bit for bit."""
     meta = parcel.meta
-    if meta["kind"] == "not finite":
-        return ImageNotFinite(meta["pixels"], width=meta["width"], log=meta["log"])
     if meta["kind"] in _ERRORS:
         return _ERRORS[meta["kind"]](meta["message"], log=meta["log"])
     arrays: dict[str, Any] = {
         name: _unpacked(parcel.blocks[name], kind, shape)
         for name, (kind, *shape) in meta["arrays"].items()
     }
+    if meta["kind"] == "not finite":
+        return ImageNotFinite(meta["pixels"], width=meta["width"], log=meta["log"], **arrays)
     if meta["kind"] == "image":
         return Image(
             **arrays, seconds=meta["seconds"], log=meta["log"], command=meta["command"],

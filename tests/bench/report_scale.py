@@ -15,10 +15,10 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -42,6 +42,7 @@ from harness.report.links import page_name
 if TYPE_CHECKING:
     from playwright.sync_api import CDPSession, Page
 
+Result = TypeVar("Result")
 RENDERERS = ("tracer", "povray", "mitsuba", "mitsuba-exact")
 FAMILIES = ("slab", "snell", "ball", "prism", "fresnel", "tir")
 SIDE = 192  # pixels of a picture
@@ -145,11 +146,20 @@ def make_run(root: Path, count: int) -> Path:
 
 
 def build(root: Path, count: int) -> dict[str, float]:
-    """Makes a run, and its report in a process of its own, for its memory."""
-    make_run(root, count)
+    """Makes a run, and its report in a process of its own, for its memory.
+
+    The run is made in another one: the most that a process ever held is also that of those which
+    it starts.
+    """
+    apart(make_run, root, count)
+    return apart(_build, root, count)
+
+
+def apart(function: Callable[[Path, int], Result], root: Path, count: int) -> Result:
+    """What `function` returns in a process of its own."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(1, mp_context=context) as pool:
-        return pool.submit(_build, root, count).result()
+        return pool.submit(function, root, count).result()
 
 
 def _build(root: Path, count: int) -> dict[str, float]:

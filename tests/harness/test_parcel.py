@@ -89,8 +89,14 @@ def test_errors(kind: type[RendererError]) -> None:
 
 
 def test_an_image_that_is_not_finite_keeps_where() -> None:
-    back = unpack_result(through_json(pack_result(ImageNotFinite([7, 9], width=4, log="x"))))
+    seen = np.array([1.0, np.nan, np.inf], np.float32)
+    sent = ImageNotFinite([7, 9], width=4, log="x", image=seen)
+    back = unpack_result(through_json(pack_result(sent)))
     assert isinstance(back, ImageNotFinite)
+    assert same(back.image, seen)
+    without = unpack_result(through_json(pack_result(ImageNotFinite([7, 9], width=4))))
+    assert isinstance(without, ImageNotFinite)
+    assert without.image is None
     assert (back.pixels, back.width, back.log) == ((7, 9), 4, "x")
     assert str(back) == str(ImageNotFinite([7, 9], width=4))
 

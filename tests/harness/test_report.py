@@ -44,7 +44,7 @@ from tests.harness.report_fixture import (
     write_run,
 )
 
-VOID = {"meta", "link", "img", "input", "br", "hr", "col"}
+VOID = {"meta", "link", "img", "input", "br", "hr", "col", "wbr"}
 POLICY = "default-src 'none'; img-src 'self'; style-src 'self'; script-src 'self'"
 
 

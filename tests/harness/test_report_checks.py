@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import pytest
 
-from harness.record import Attribution, Check, SummaryCase, Verdict
+from harness.record import Attribution, Cause, Check, Diagnosis, SummaryCase, Verdict
 from harness.report import overview
-from harness.report.checks import check_view, elsewhere, grouped, meaning, sorted_views, told
-from tests.harness.report_fixture import summary_of
+from harness.report.checks import (
+    check_view,
+    elsewhere,
+    failing,
+    grouped,
+    meaning,
+    ranked,
+    sorted_views,
+    told,
+)
+from harness.report.digest import Digest
+from harness.summary_file import Span
 
 
 def check(
@@ -96,13 +106,27 @@ def test_every_renderer_that_fails_is_among_the_first_failures() -> None:
     pair = check("tracer", observable="ssim", against="mytracer", off="mytracer")
     made = [*many, pair, *(crash(observable=name) for name in names)]
     case = SummaryCase(id="slab", family="slab", status=Verdict.ERROR, checks=made)
-    summary = summary_of([]).model_copy(update={"cases": [case]})
-    shown, left_out = overview.failures(summary)
+    digest = Digest()
+    digest.add(case, Span(0, 0))
+    shown, left_out = overview.failures(digest)
     assert [(f.off, f.more) for f in shown[:3]] == [
         ("mytracer", 0), ("crashing", 6), ("mytracer", 0),
     ]  # fmt: skip
     assert all(f.off != "tracer" for f in shown)
     assert len(shown) + left_out == 9  # eight observables of mytracer's, one crash
+
+
+def test_diagnoses_are_red_only_of_who_is_off_and_is_not_documented() -> None:
+    pair = check("tracer", observable="rmse", against="mytracer", off="mytracer")
+    assert failing([pair, check("povray", Verdict.PASS)]) == {"mytracer"}
+    documented = Cause(id="documented", sentence="", residual=0.0, explains=1.0)
+    diagnoses = [
+        Diagnosis(renderer="mytracer", sentence="as documented", cause=documented),
+        Diagnosis(renderer="tracer", sentence="is off"),
+        Diagnosis(renderer="mytracer", sentence="is off"),
+    ]
+    found = [(tone, d.sentence) for tone, d in ranked(diagnoses, {"mytracer"})]
+    assert found == [("fail", "is off"), ("known", "as documented"), ("known", "is off")]
 
 
 def test_a_name_that_stands_before_a_sentence_is_not_repeated() -> None:

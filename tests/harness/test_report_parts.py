@@ -237,6 +237,20 @@ def test_legend_states_the_worst_residual_and_its_share_of_the_tolerance_there()
     assert entry.over
 
 
+def test_a_renderer_is_measured_by_its_own_tolerance() -> None:
+    """The band is the widest, in which a coarse renderer and a fine one both have room."""
+    x, off = [0.0, 1.0], [2e-6, 2e-6]
+    fine = Series(renderer="tracer", x=x, y=off, tolerance=[1e-8, 1e-8])
+    coarse = Series(renderer="povray", x=x, y=off, tolerance=[1e-5, 1e-5])
+    both = [Series(renderer=s.renderer, x=x, y=[0.0, 0.0]) for s in (fine, coarse)]
+    curve = a_curve([], tolerance=[1e-5, 1e-5], series=both, residuals=[fine, coarse])
+    chart = draw(curve, COLOURS)
+    assert [entry.over for entry in chart.legend] == [True, False]
+    assert chart.legend[0].used == "200×"
+    assert chart.widest
+    assert not draw(a_curve([0.0], [0.0], tolerance=[1.0]), COLOURS).widest
+
+
 def test_a_wild_renderer_does_not_flatten_the_truth() -> None:
     x = [0.0, 1.0, 2.0]
     truth = Series(renderer="truth", x=x, y=[0.0, 0.5, 1.0])

@@ -1,16 +1,19 @@
-"""Many cases: what the index weighs, and that nothing in it grows faster than their number.
+"""Many cases: what the index weighs and what is held at once do not grow faster than they may.
 
 How long it takes is measured in tests/bench/report_scale.py.
 """
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 from harness.report import write_report
 from tests.bench.report_scale import make_run
 
 PER_CASE = 5_000  # bytes of the index: a thousand cases are 5 MB
+# Bytes of memory: ids, links, verdicts, and what waits to be collected. Checks would be 40,000.
+HELD_PER_CASE = 20_000
 
 
 def test_a_thousand_cases_would_be_five_megabytes(tmp_path: Path) -> None:
@@ -22,3 +25,14 @@ def test_a_thousand_cases_would_be_five_megabytes(tmp_path: Path) -> None:
     per_case = (sizes[220] - sizes[160]) / 60
     assert per_case < PER_CASE
     assert sizes[160] - 160 * per_case < 200_000
+
+
+def test_what_is_held_at_once_does_not_grow_by_what_cases_say(tmp_path: Path) -> None:
+    held = {}
+    for count in (3, 10, 60):  # of the first, what is loaded once
+        root = make_run(tmp_path / str(count), count)
+        tracemalloc.start()
+        write_report(root)
+        held[count] = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+    assert held[60] - held[10] < 50 * HELD_PER_CASE

@@ -9,8 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import record
-from harness.errors import InputError, RendererFailed, RendererMissing, RendererUnsupported
+from harness import imagefile, record
+from harness.errors import (
+    ImageNotFinite,
+    InputError,
+    RendererFailed,
+    RendererMissing,
+    RendererUnsupported,
+)
 from harness.record import Verdict, worst
 from harness.renderers.base import (
     Capability,
@@ -313,6 +319,21 @@ def test_what_crashes_in_one_case_costs_that_case(error: BaseException, tmp_path
     assert odd.status is Verdict.ERROR
     if isinstance(error, RendererFailed):
         assert odd.log_tail == "line 1\nstd::bad_alloc"
+
+
+def test_a_picture_that_is_not_finite_can_still_be_looked_at(tmp_path: Path) -> None:
+    seen = np.full((48, 48, 3), 0.5, np.float32)
+    seen[3, 5] = np.nan
+    error = ImageNotFinite([3 * 48 + 5], width=48, image=seen)
+    run_tiny(tmp_path, Given(raising(error), in_glass), student(), cases=["ball"])
+    (written,) = map(record.read_case, (tmp_path / "records").iterdir())
+    odd = next(r for r in written.runs if r.name == "odd")
+    assert odd.status is Verdict.ERROR
+    (kept,) = odd.images
+    pixels, info = imagefile.read(tmp_path / kept.path)
+    assert info.nonfinite == 1
+    assert np.isnan(pixels[3, 5]).all()
+    assert kept.mean == []
 
 
 def test_a_fail_outweighs_what_could_not_run(tmp_path: Path) -> None:

@@ -166,6 +166,10 @@ def test_a_pinned_pixel_shows_its_ray(page: Page, run: Path) -> None:
     assert page.locator(".section .true-ray").count() == 1
     assert page.locator(".section .solid").count() >= 1
     assert f"{theta_i:.3f}°" in (page.locator(".section").text_content() or "")
+    outside = """() => [...document.querySelectorAll(".section .angle")].filter((label) => {
+        const [box, all] = [label, label.closest("svg")].map((e) => e.getBoundingClientRect());
+        return box.left < all.left || box.right > all.right || box.bottom > all.bottom; }).length"""
+    assert page.evaluate(outside) == 0
 
 
 def test_curves_tell_their_values_and_show_the_ray(page: Page, run: Path) -> None:
@@ -272,9 +276,12 @@ def states(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_pixels_that_are_not_finite_are_marked_and_named(page: Page, states: Path) -> None:
-    open_case(page, states, "ball-checkerboard", "#pin=3,2")
+    open_case(page, states, "ball-checkerboard", "#pin=3,2&a=povray")
     assert [255, 0, 255] in colours_of(page, 1)
     assert page.locator("tr[data-image='povray'] td").all_inner_texts() == ["NaN"] * 3
+    worst = page.locator(".jump").all_inner_texts()
+    assert "(3, 2)" in worst[0]
+    assert "not finite" in worst[0]
     page.goto(page.url.replace("pin=3,2", "pin=5,4"))
     page.reload()
     page.wait_for_selector("#viewer[data-ready]")

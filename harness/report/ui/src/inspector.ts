@@ -24,7 +24,7 @@ export class Inspector {
   private readonly clear: HTMLButtonElement;
   private readonly counted = new WeakMap<Image, Counts>();
   private spreadOf: readonly (Image | null)[] = [];
-  private shown: { title: string; figures: Float32Array | undefined } = { title: "", figures: undefined };
+  private shown: { title: string; figures: Float32Array | undefined } | null = null;
 
   constructor(private readonly jump: (pixel: Pixel) => void, unpin: () => void) {
     this.clear = h("button", { type: "button", class: "plain small", click: unpin }, "unpin");
@@ -42,7 +42,8 @@ export class Inspector {
     if (!pixel) {
       this.heading.textContent = "Pixel";
       this.table.replaceChildren(h("p", { class: "muted small" },
-        "Point at a pixel for its values; click to pin it and to see its ray."));
+        "Point at a pixel for its values; click to pin it" + (errors.length ? " and to see its ray."
+          : ". No rays were measured in this case.")));
       return;
     }
     this.heading.textContent = `Pixel (${pixel.x}, ${pixel.y})${pinned ? ", pinned" : ""}`;
@@ -77,20 +78,27 @@ export class Inspector {
           h("td", {}, off.get(name) ?? ""), h("td", {}, turned.get(name) ?? "")))) : "");
   }
 
-  figures(title: string, unit: string, figures: Float32Array | undefined, width: number, step: number): void {
-    if (title === this.shown.title && figures === this.shown.figures) return;
-    this.shown = { title, figures };
-    const list = figures ? worstPixels(figures, width) : [];
+  /** Lists the worst of `figures`, first those that are `lost`; where there are none, `problem` says why. */
+  figures(
+    title: string, unit: string, figures: Float32Array | undefined, width: number, step: number,
+    { problem = "", lost = (_: number): boolean => false } = {},
+  ): void {
+    const key = title || problem;
+    if (key === this.shown?.title && figures === this.shown.figures) return;
+    this.shown = { title: key, figures };
+    const list = figures ? worstPixels(figures, width, lost) : [];
     if (!list.length) {
       this.worst.replaceChildren(h("p", { class: "muted small" },
-        figures ? "No pixel differs." : "Choose two pictures to compare."));
+        figures ? "No pixel differs." : problem || "Choose two pictures to compare."));
       return;
     }
     const buttons = list.map((one) => {
       const pixel = { x: one.x * step, y: one.y * step };
       const text = `(${pixel.x}, ${pixel.y})`;
+      const figure = Number.isFinite(one.value)
+        ? number(one.value, 3) + (unit ? `\u202f${unit}` : "") : "not finite";
       return h("li", {}, h("button", { type: "button", class: "jump", click: () => this.jump(pixel) },
-        h("span", {}, text), h("b", { class: "num" }, number(one.value, 3) + (unit ? `\u202f${unit}` : ""))));
+        h("span", {}, text), h("b", { class: "num" }, figure)));
     });
     this.worst.replaceChildren(h("p", { class: "muted small" }, title), h("ol", {}, ...buttons));
   }

@@ -47,11 +47,12 @@ export const MAPS: Partial<Record<Mode, MapMode>> = {
 };
 
 /**
- * Of figures (W × H): the largest that are not neighbours of a larger one, with their places. Looks
- * for one after the other: that is exact, and sorting millions of figures is not to be waited for.
+ * Of figures (W × H): the largest that are not neighbours of a larger one, with their places; those
+ * that are `lost` count as larger than any number. Looks for one after the other: that is exact, and
+ * sorting millions of figures is not to be waited for.
  */
 export function worstPixels(
-  figures: Float32Array, width: number, most = 8,
+  figures: Float32Array, width: number, lost: (k: number) => boolean, most = 8,
 ): { x: number; y: number; value: number }[] {
   const near = Math.max(2, Math.round(width / 48)) ** 2;
   const found: { x: number; y: number; value: number }[] = [];
@@ -60,13 +61,21 @@ export function worstPixels(
     return found.some((f) => (f.x - x) ** 2 + (f.y - y) ** 2 <= near);
   };
   while (found.length < most) {
-    let [best, at] = [0, -1]; // NaN is never larger
-    for (let k = 0; k < figures.length; k++) {
-      const size = Math.abs(figures[k] as number);
+    let [best, at] = [0, -1];
+    for (let k = 0; k < figures.length && best < Infinity; k++) {
+      const figure = figures[k] as number;
+      const size = Number.isNaN(figure) && lost(k) ? Infinity : Math.abs(figure); // NaN is never larger
       if (size > best && !taken(k)) [best, at] = [size, k];
     }
     if (at < 0) break;
     found.push({ x: at % width, y: Math.floor(at / width), value: figures[at] as number });
   }
   return found;
+}
+
+/** Whether only one of two pictures of the same size is finite at pixel k; both are not where a view has none. */
+export function lostIn(one: Image, two: Image): (k: number) => boolean {
+  const finite = ({ planes, width, height }: Image, k: number): boolean =>
+    [0, 1, 2].every((c) => Number.isFinite(planes[c * width * height + k]));
+  return (k) => finite(one, k) !== finite(two, k);
 }

@@ -196,15 +196,16 @@ function renderedEnds(
   });
 }
 
-/** Finds labels a place where no other is, beside the one they would rather have. */
+/** Finds labels a place in the drawing where no other is, beside the one they would rather have. */
 type Room = (wished: Point, text: string) => Point | null;
 
 function freeRoom(): Room {
   const taken: (readonly [Point, number])[] = []; // centre and half the width
   return (wished, text) => {
     const half = (text.length * LETTER) / 2;
+    const x = within(wished[0], half + 4, WIDTH - half - 4);
     for (const step of [0, -1, 1, -2, 2, -3, 3]) {
-      const place: Point = [wished[0], wished[1] + step * LINE];
+      const place: Point = [x, within(wished[1] + step * LINE, LINE, HEIGHT - LINE)];
       const free = taken.every(([other, wide]) =>
         Math.abs(other[0] - place[0]) > half + wide || Math.abs(other[1] - place[1]) >= LINE);
       if (!free) continue;
@@ -213,6 +214,10 @@ function freeRoom(): Room {
     }
     return null; // the table beside the diagram has the angle
   };
+}
+
+function within(value: number, low: number, high: number): number {
+  return Math.min(high, Math.max(low, value));
 }
 
 function interfaceMarks(

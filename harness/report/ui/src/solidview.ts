@@ -7,15 +7,24 @@ import { add, cross, dot, minus, times, unit } from "./vector";
 
 const SIDE = 300;
 
-/** Edges worth drawing: where faces meet at an angle; of a sphere three great circles. */
-function edges(solid: Solid): [Vec3, Vec3][] {
+/** A line of a solid. One between faces that meet smoothly is drawn where it is the outline. */
+interface Edge {
+  readonly ends: readonly [Vec3, Vec3];
+  readonly faces?: readonly [Vec3, Vec3]; // normals
+}
+
+const SHARP = Math.cos((15 * Math.PI) / 180);
+const MOST_EDGES = 20000;
+
+/** The edges of a solid; of a sphere three great circles. */
+function edges(solid: Solid): Edge[] {
   if (solid.center) return circles(solid.center, solid.radius);
   const { corners, triangles } = solid;
   if (!corners) return [];
   const corner = (k: number): Vec3 =>
     [corners[3 * k] ?? 0, corners[3 * k + 1] ?? 0, corners[3 * k + 2] ?? 0];
   const normals = new Map<string, Vec3>();
-  const found: [Vec3, Vec3][] = [];
+  const found: Edge[] = [];
   for (let t = 0; t < triangles.length; t += 3) {
     const index = [0, 1, 2].map((k) => triangles[t + k] as number);
     const [a, b, c] = index.map(corner) as [Vec3, Vec3, Vec3];
@@ -25,20 +34,24 @@ function edges(solid: Solid): [Vec3, Vec3][] {
       const key = ends.join(" ");
       const other = normals.get(key);
       if (!other) normals.set(key, n);
-      else if (dot(other, n) < 0.995) found.push([corner(ends[0] as number), corner(ends[1] as number)]);
+      else if (dot(other, n) < 1 - 1e-9) {
+        const line = [corner(ends[0] as number), corner(ends[1] as number)] as const;
+        found.push(dot(other, n) < SHARP ? { ends: line } : { ends: line, faces: [other, n] });
+      }
     }
   }
-  return found.length > 1500 ? found.filter((_, k) => k % Math.ceil(found.length / 1500) === 0) : found;
+  const every = Math.ceil(found.length / MOST_EDGES);
+  return every > 1 ? found.filter((_, k) => k % every === 0) : found;
 }
 
-function circles(center: Vec3, radius: number): [Vec3, Vec3][] {
+function circles(center: Vec3, radius: number): Edge[] {
   const axes: Vec3[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
   return axes.flatMap((u, k) => {
     const v = axes[(k + 1) % 3] as Vec3;
     const at = (turn: number): Vec3 => add(center,
       add(times(radius * Math.cos(turn), u), times(radius * Math.sin(turn), v)));
-    return Array.from({ length: 48 }, (_, n): [Vec3, Vec3] =>
-      [at((2 * Math.PI * n) / 48), at((2 * Math.PI * (n + 1)) / 48)]);
+    return Array.from({ length: 48 }, (_, n): Edge =>
+      ({ ends: [at((2 * Math.PI * n) / 48), at((2 * Math.PI * (n + 1)) / 48)] }));
   });
 }
 
@@ -67,7 +80,7 @@ export function solidView(rays: Rays, ray: Ray): HTMLElement {
   const lines = rays.solids.flatMap(edges);
   const reach = Math.max(0.5, ...met.map((p) => Math.hypot(...minus(p, centre)))) * 2.6;
   const rings = met.map((p, k) => ring(p, normalAt(ray, k), 0.3 * reach));
-  const near = lines.filter(([a, b]) => [a, b].some((p) => Math.hypot(...minus(p, centre)) < 3 * reach));
+  const near = lines.filter(({ ends }) => ends.some((p) => Math.hypot(...minus(p, centre)) < 3 * reach));
   const drawing = svg("svg", { class: "solid-view", viewBox: `0 0 ${SIDE} ${SIDE}`, role: "img", tabindex: 0,
     "aria-label": "The ray in space; drag, or use the arrow keys, to turn it" });
   let [azimuth, height] = [0.6, 0.35];
@@ -80,8 +93,10 @@ export function solidView(rays: Rays, ray: Ray): HTMLElement {
       const up = ch * y - sh * away;
       return `${(SIDE / 2 + (side / reach) * (SIDE / 2)).toFixed(1)} ${(SIDE / 2 - (up / reach) * (SIDE / 2)).toFixed(1)}`;
     };
+    const view: Vec3 = [-sa * ch, -sh, -ca * ch]; // away from the eye
+    const seen = near.filter(({ faces }) => !faces || dot(faces[0], view) > 0 !== dot(faces[1], view) > 0);
     drawing.replaceChildren(
-      svg("path", { class: "wire", d: near.map(([a, b]) => `M${place(a)}L${place(b)}`).join("") }),
+      svg("path", { class: "wire", d: seen.map(({ ends: [a, b] }) => `M${place(a)}L${place(b)}`).join("") }),
       ...rings.map((points) => svg("path", { class: "facet", d: `M${points.map(place).join("L")}z` })),
       svg("path", { class: "true-ray", d: "M" + ray.vertices.map(place).join("L") }),
       ...met.map((p) => {

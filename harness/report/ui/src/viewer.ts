@@ -7,11 +7,11 @@ import { paneLabel, problemOf } from "./captions";
 import { colourBar } from "./colourbar";
 import { Controls } from "./controls";
 import { h, reducedMotion } from "./dom";
-import { number } from "./format";
+import { superscript } from "./format";
 import { firstPair } from "./firstpair";
 import { Inspector } from "./inspector";
 import { arranged } from "./layout";
-import { MAPS } from "./maps";
+import { lostIn, MAPS } from "./maps";
 import type { Image } from "./pack";
 import { type Layer, Pane, type Sheet } from "./pane";
 import { RayPanel } from "./raypanel";
@@ -146,7 +146,7 @@ export class Viewer {
     const missing = mode === "side" ? this.data.absent.map((one) =>
       h("figure", { class: "pane missing" },
         h("figcaption", {}, this.name(one.name)),
-        h("div", { class: `frame none s-${one.word === "crashed" ? "error" : "skip"}` },
+        h("div", { class: `frame none s-${one.word === "failed" ? "error" : "skip"}` },
           h("span", {}, one.word), one.reason && h("small", {}, one.reason)))) : [];
     this.stage.replaceChildren(...this.panes.map((pane) => pane.element), ...missing);
     this.places = this.panes.length + missing.length;
@@ -286,7 +286,7 @@ export class Viewer {
     if (!map || !scale) {
       const { exposure, encoding } = this.state;
       this.bar.replaceChildren(h("p", { class: "muted small" },
-        `Linear radiance × 2^${number(exposure, 3)}, ` +
+        `Linear radiance${exposure ? ` × 2${superscript(exposure)}` : ""}, ` +
         `${encoding === "srgb" ? "sRGB" : "gamma 2.2"}; `,
         h("b", { class: "swatch not-finite" }, "magenta"), " is not finite."));
       return;
@@ -298,10 +298,8 @@ export class Viewer {
     const { pins, mode, a, b } = this.state;
     const pixel = this.hovered ?? pins[pins.length - 1] ?? null;
     const rows = [...this.images.values()].map((image) => ({ name: this.name(image.name), image }));
-    const errors = this.rays.flatMap((rays) => [...rays.errors].map(([name, figures]) => ({
-      name, figures, width: Math.ceil(rays.probe.width / rays.probe.errorStep),
-      step: rays.probe.errorStep,
-    })));
+    const errors = this.rays.flatMap(({ errors: each, probe }) => [...each].map(([name, figures]) => (
+      { name, figures, width: Math.ceil(probe.width / probe.errorStep), step: probe.errorStep })));
     this.inspector.values(pixel, pins.length, this.hovered === null, rows, this.images.get(b), errors);
     const subject = this.subjects()[0] ?? a;
     const focus = mode === "rays" || !MAPS[mode] || !this.state.every ? a : this.images.has(a) && a !== b ? a : subject;
@@ -310,11 +308,13 @@ export class Viewer {
       this.inspector.figures(one ? `ray error of ${one.name}` : "", "µrad",
         one?.figures, one?.width ?? 1, one?.step ?? 1);
     } else if (this.images.has(focus) && focus !== b && this.fits(focus)) {
+      const [one, two] = [this.images.get(focus) as Image, this.images.get(b) as Image];
       const by: Mode = MAPS[mode] ? mode : "diff";
       this.inspector.figures(`${MAPS[by]?.title ?? ""}, A ${focus}, B ${b}`, MAPS[by]?.unit ?? "",
-        this.figures(by, focus, b), (this.images.get(focus) as Image).width, 1);
+        this.figures(by, focus, b), one.width, 1, { lost: lostIn(one, two) });
     } else {
-      this.inspector.figures("", "", undefined, 1, 1);
+      const problem = problemOf({ ...this.state, mode: "diff", a: focus }, this.images, true);
+      this.inspector.figures("", "", undefined, 1, 1, { problem });
     }
     this.inspector.histogram(MAPS[mode] ? null : this.images.get(a) ?? null, this.images.get(b) ?? null);
     this.rayPanel.show(pins[pins.length - 1] ?? null);
