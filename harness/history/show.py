@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 from rich.console import Console
@@ -60,19 +59,19 @@ def curves(case: str, points: Sequence[Point]) -> list[Curve]:
         mine = [p for p in points if _what(p) == name and p.deviation is not None]
         if not mine:
             continue
-        tolerances = {point.run: point.tolerance or 0.0 for point in mine}
-        lengths = Counter(point.renderer for point in mine)
-        longest = max(mine, key=lambda point: lengths[point.renderer])
+        residuals = list(_series(mine, lambda point: point.deviation, _tolerance))
+        widest = {
+            run: max(_tolerance(point) for point in mine if point.run == run)
+            for run in map(int, residuals[0].x)
+        }
+        unit = next((point.unit for point in mine if point.unit), "")
         charts.append(
             Curve(
                 id=name, title=f"{case}: {name}", x_label="run",
-                y_label=f"value, {longest.unit}" if longest.unit else "value",
+                y_label=f"value, {unit}" if unit else "value",
                 series=list(_series(mine, lambda point: point.value)),
-                residual_label="value less expected value",
-                residuals=list(_series(mine, lambda point: point.deviation)),
-                tolerance=[
-                    tolerances[point.run] for point in mine if point.renderer == longest.renderer
-                ],
+                residual_label="value less expected value", residuals=residuals,
+                tolerance=list(widest.values()),
             )
         )  # fmt: skip
     return charts
@@ -91,11 +90,21 @@ def rows(points: Sequence[Point]) -> list[list[str]]:
     return found
 
 
-def _series(points: Sequence[Point], figure: Figure) -> Iterator[Series]:
+def _series(
+    points: Sequence[Point], figure: Figure, tolerance: Callable[[Point], float] | None = None
+) -> Iterator[Series]:
     for renderer in dict.fromkeys(point.renderer for point in points):
-        figures = [(p.run, figure(p)) for p in points if p.renderer == renderer]
-        known = [(float(run), value) for run, value in figures if value is not None]
-        yield Series(renderer=renderer, x=[x for x, _ in known], y=[y for _, y in known])
+        mine = [(p, figure(p)) for p in points if p.renderer == renderer]
+        known = [(point, value) for point, value in mine if value is not None]
+        yield Series(
+            renderer=renderer, x=[float(point.run) for point, _ in known],
+            y=[value for _, value in known],
+            tolerance=[tolerance(point) for point, _ in known] if tolerance else [],
+        )  # fmt: skip
+
+
+def _tolerance(point: Point) -> float:
+    return point.tolerance or 0.0
 
 
 def _what(point: Point) -> str:

@@ -147,6 +147,10 @@ def test_the_page_has_a_chart_per_check_and_a_line_per_run(
     }  # fmt: skip
     value = {c.renderer: c.value for c in checks_of(summary) if "inside" in c.id}
     assert [s.y for s in curves[0].series] == [[value[s.renderer]] * 3 for s in curves[0].series]
+    allowed = {c.renderer: c.tolerance for c in checks_of(summary) if "inside" in c.id}
+    assert len(set(allowed.values())) == 2  # each is measured by its own, the band is the widest
+    assert {s.renderer: s.tolerance[0] for s in curves[0].residuals} == allowed
+    assert curves[0].tolerance == [max(t for t in allowed.values() if t is not None)] * 3
     page = write_history(tmp_path, "snell-<sweep>", curves, show_history.rows(points))
     text = page.read_text()
     assert text.count('<svg class="chart"') == 1
