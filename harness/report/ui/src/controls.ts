@@ -41,7 +41,8 @@ export class Controls {
     }
     this.every = h("input", { type: "checkbox" });
     this.every.addEventListener("change", () => actions.set({ every: this.every.checked }));
-    this.everyLabel = h("label", { class: "tick" }, this.every, "every picture against B");
+    this.everyLabel = h("label", { class: "tick", title: "Every picture against B (m)" },
+      this.every, "all against B");
     this.exposure = h("input", { type: "range", min: -10, max: 10, step: 0.5, "aria-label": "Exposure" });
     this.exposure.addEventListener("input", () => actions.set({ exposure: this.exposure.valueAsNumber }));
     this.encoding = h("select", { "aria-label": "Encoding" },
@@ -55,8 +56,8 @@ export class Controls {
     this.element = h("div", { class: "controls" },
       h("div", { class: "segments", role: "group", "aria-label": "Mode" }, ...this.modes.values()),
       h("label", {}, "A ", this.pickers.get("a")), h("label", {}, "B ", this.pickers.get("b")),
-      this.everyLabel,
-      h("label", { class: "exposure" }, "EV ", this.exposure, this.reading), this.encoding,
+      h("label", { class: "exposure" }, "EV ", this.exposure, this.reading),
+      this.encoding, this.everyLabel, // one of them, so that pictures stay where they are
       h("button", { type: "button", class: "small-button", title: "Fit (f)", click: actions.fit }, "Fit"),
       h("button", { type: "button", class: "small-button", title: "Reset exposure (r)", click: actions.reset }, "Reset"));
   }
