@@ -214,7 +214,8 @@ class _Report:
     def index(self, rows: list[view.Line]) -> Iterator[str]:
         """The index page, part after part."""
         families = sorted({row.family for row in rows})
-        statuses = [v.value for v in records.SEVERITY if any(row.status == v for row in rows)]
+        seen = {status for row in rows for status in (row.status, *row.verdicts)}
+        statuses = [v.value for v in records.SEVERITY if v in seen]
         verdict = overview.headline(self.summary, self.digest)
         return self.environment.get_template("index.html.j2").generate(
             headline=verdict,

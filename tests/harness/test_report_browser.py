@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, Page
 from harness.record import CaseRecord, Table, Verdict
 from harness.report import write_report
 from harness.scene.load import find
-from tests.harness.report_fixture import make_run, summary_of, write_run
+from tests.harness.report_fixture import Draft, check, make_run, run_of, summary_of, write_run
 
 pytestmark = pytest.mark.browser
 
@@ -24,6 +24,26 @@ SCENES = Path(__file__).resolve().parents[2] / "scenes"
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = make_run(tmp_path_factory.mktemp("run"), size=24)
     write_report(root)
+    return root
+
+
+def run_of_mixed_cases(root: Path) -> Path:
+    """One case that a renderer passes, one fails and one crashed in, and one that passes."""
+    verdicts = {
+        "both": {"tracer": Verdict.PASS, "povray": Verdict.FAIL, "mytracer": Verdict.ERROR},
+        "fine": {"tracer": Verdict.PASS, "povray": Verdict.PASS},
+    }
+    cases = []
+    for name, found in verdicts.items():
+        draft = Draft(name, "A slab only shifts the ray", "slab")
+        for renderer, verdict in found.items():
+            value = {Verdict.PASS: 1e-13, Verdict.FAIL: 1e-3}.get(verdict)
+            draft.checks.append(
+                check("slab_offset", renderer, value, 0.0, 1e-12, "units", status=verdict)
+            )
+            draft.runs.append(run_of(renderer, verdict))
+        cases.append(draft.finished())
+    write_report(write_run(root, cases))
     return root
 
 
@@ -71,6 +91,16 @@ def test_chips_filter_by_status_renderer_and_family(page: Page, run: Path) -> No
     chip(page, "slab").click()
     assert set(shown(page)) == {"slab-offset", "slab-thin-face"}
     assert chip(page, "slab").get_attribute("aria-pressed") == "true"
+
+
+def test_a_failure_is_found_beside_a_renderer_that_crashed(page: Page, tmp_path: Path) -> None:
+    """The case as a whole is an error then, which must not hide what else is wrong with it."""
+    run = run_of_mixed_cases(tmp_path)
+    page.goto((run / "index.html").as_uri())
+    for status, cases in (("fail", ["both"]), ("error", ["both"]), ("pass", ["fine"])):
+        chip(page, status).click()
+        assert shown(page) == cases
+        chip(page, status).click()
 
 
 def test_filters_survive_in_the_address(page: Page, run: Path) -> None:

@@ -47,8 +47,10 @@ export function startMatrix(): void {
       [string[], string[], string[], string[]];
     let shown = 0;
     for (const row of rows) {
-      // With renderers chosen, a status means theirs; otherwise that of the case as a whole.
-      const own = renderers.length ? renderers.map((k) => row.cells[Number(k)] ?? "-") : [row.status];
+      // With renderers chosen, a status means theirs; otherwise anybody's, but a case in which
+      // anything is off does not pass because some renderer does.
+      const own = renderers.length ? renderers.map((k) => row.cells[Number(k)] ?? "-")
+        : [row.status, ...row.cells.filter((status) => status !== "pass")];
       const visible = words.every((word) => textOf(row).includes(word)) &&
         (!families.length || families.includes(row.family)) &&
         (!changes.length || changes.includes(row.change)) &&
