@@ -30,16 +30,25 @@ def _with_indices(world: World, change: Callable[[float], float]) -> World:
 
 
 def _index(world: World, a: Values) -> World:
+    """Surroundings of 1 are no glass whose index anybody reads; water is, which leaves ratios."""
+    wrong = _solids_index(world, a)
+    around, *solids = wrong.scene.media
+    if around.ior != 1:
+        around = around.model_copy(update={"ior": around.ior * (1 + a[0])})
+    return replace(wrong, scene=wrong.scene.model_copy(update={"media": (around, *solids)}))
+
+
+def _solids_index(world: World, a: Values) -> World:
     return _with_indices(world, lambda n: n * (1 + a[0]))
 
 
-def _says_index(fit: Fitted) -> str:
+def _says_index(fit: Fitted, whose: str = "every index") -> str:
     if len(fit.iors) == 1:
         n = fit.iors[0]
         wrong = plus_minus(n * (1 + fit.values[0]), n * fit.errors[0])
         return f"refracts as if n = {wrong} (the scene says {n:.6g})"
     way = "small" if fit.values[0] < 0 else "large"
-    return f"refracts as if every index were {percent(fit.values[0], fit.errors[0])} too {way}"
+    return f"refracts as if {whose} were {percent(fit.values[0], fit.errors[0])} too {way}"
 
 
 def _fixed_index(world: World, a: Values) -> World:
@@ -350,6 +359,11 @@ REFRACTION = (
         "spawn-ahead", _ahead,
         lambda f: f"starts rays {f} units further along their way, so that less of it absorbs",
         ((1e-4,), (1e-6,), (1e-2,)), "offset", "units",
+    ),
+    Hypothesis(
+        "index-of-solids", _solids_index,
+        lambda fit: _says_index(fit, "the index of every solid"), ((0.0,), (-0.1,), (0.1,)),
+        "relative error", kin="index",
     ),
     Hypothesis(
         "index-fixed", _fixed_index,

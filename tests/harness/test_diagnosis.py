@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.data import scenes_root
 from harness.diagnosis.choose import diagnose
 from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting
 from harness.diagnosis.hypothesis import plus_minus
@@ -104,8 +105,8 @@ def test_summary_and_records_survive_being_written(tmp_path: Path) -> None:
 # --- every hypothesis knows itself ----------------------------------------------------------------
 
 
-def setting(case: str, probe: int = 0) -> Setting:
-    prepared = prepare(find([case], SCENES)[0])
+def setting(case: str, probe: int = 0, scenes: Path = SCENES) -> Setting:
+    prepared = prepare(find([case], scenes)[0])
     chosen = prepared.loaded.model.probes[probe]
     scene = expand_thin_slabs(prepared.scene)
     rays = primary_rays(scene)
@@ -207,6 +208,25 @@ def test_a_case_without_deviation_speaks_against_a_cause() -> None:
     assert doubted.runner_up is not None
     assert doubted.runner_up.id == "straight-on"
     assert "would explain 1 of 1, but slab, where it would show, is right" in doubted.sentence
+
+
+@pytest.mark.parametrize("name", ["index", "index-of-solids"])
+def test_water_in_water_tells_whether_surroundings_are_as_wrong_as_solids(name: str) -> None:
+    """Every index too small leaves their ratio, and that of solids alone does not."""
+    noise = np.random.default_rng(8)
+    asked = {"snell": setting("snell"), "water": setting("identity*1.333*", scenes=scenes_root())}
+    shown = {
+        case: shown_by(BY_ID[name].world(World.right(one), (-0.01,)), False, noise)
+        for case, one in asked.items()
+    }
+    by_case = {case: diagnose("it", [evidence]) for case, evidence in shown.items()}
+    known = {case: d for case, d in by_case.items() if d is not None}
+    assert ("water" in known) is (name == "index-of-solids")
+    right = [Witness(case, (shown[case],)) for case in shown if case not in known]
+    (found,) = diagnose_run("it", known, right)
+    assert found.cause is not None
+    assert found.cause.id == name
+    assert found.unexplained == []
 
 
 def test_two_faults_are_two_diagnoses() -> None:
