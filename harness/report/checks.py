@@ -8,13 +8,17 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from harness.measure.observables import Observable
 from harness.record import Check, Diagnosis, Verdict
 from harness.report.links import clean
 from harness.report.quantity import NARROW_SPACE, number, share, with_unit
+
+T = TypeVar("T")
 
 # What to look at first: a wrong number tells more than one that is missing.
 FIRST_TO_LOOK_AT = (Verdict.FAIL, Verdict.ERROR, Verdict.SKIP, Verdict.KNOWN, Verdict.PASS)
@@ -166,6 +170,21 @@ def who_is_off(check: Check) -> str:
     """Who is off where a check fails: of two that differ perhaps the other one."""
     off = check.attribution.off if check.attribution else []
     return check.renderer if check.renderer in off or not off else off[0]
+
+
+def kind_of(check: Check) -> tuple[str, str]:
+    """Who is off and in what, or why without figures: failures that agree in both are alike."""
+    return who_is_off(check), check.observable if check.status is Verdict.FAIL else check.reason
+
+
+def in_turns(items: Iterable[tuple[str, T]]) -> list[T]:
+    """Every name's first item before any name's second, lest one name's many hide all others."""
+    turns: Counter[str] = Counter()
+    numbered = []
+    for name, item in items:
+        numbered.append((turns[name], item))
+        turns[name] += 1
+    return [item for _, item in sorted(numbered, key=lambda pair: pair[0])]
 
 
 def failing(checks: Iterable[Check]) -> set[str]:

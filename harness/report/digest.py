@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from harness.record import Check, SummaryCase, Verdict
-from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view, who_is_off
+from harness.record import SummaryCase, Verdict
+from harness.report.checks import BAD, FIRST_TO_LOOK_AT, CheckView, check_view, kind_of
 from harness.summary_file import Span, SummaryFile
 
 Rank = tuple[int, float]
@@ -76,7 +76,7 @@ class Digest:
     def _failed(self, found: Found) -> None:
         if self.worst is None or found.view.rank < self.worst.view.rank:
             self.worst = found
-        kind = self.kinds.setdefault(_kind(found.view.check), Kind(found, 0))
+        kind = self.kinds.setdefault(kind_of(found.view.check), Kind(found, 0))
         kind.count += 1
         if found.view.rank < kind.worst.view.rank:
             kind.worst = found
@@ -99,7 +99,3 @@ def _rank(status: Verdict, views: list[CheckView]) -> Rank:
     if status not in BAD:
         return place, 0.0
     return min((view.rank for view in views), default=(place, 0.0))
-
-
-def _kind(check: Check) -> tuple[str, str]:
-    return who_is_off(check), check.observable if check.status is Verdict.FAIL else check.reason

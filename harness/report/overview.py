@@ -9,7 +9,7 @@ from datetime import datetime
 from itertools import groupby
 
 from harness.record import RendererSummary, Summary, Verdict
-from harness.report.checks import FIRST_TO_LOOK_AT, CheckView
+from harness.report.checks import FIRST_TO_LOOK_AT, CheckView, in_turns
 from harness.report.digest import Digest
 from harness.report.links import clean
 from harness.report.quantity import count, number
@@ -71,14 +71,11 @@ def failures(digest: Digest) -> tuple[list[Failure], int]:
     renderer's second, lest what fails most hide who fails at all.
     """
     kinds = sorted(digest.kinds.items(), key=lambda item: item[1].worst.view.rank)
-    turns: Counter[str] = Counter()
-    in_turn: list[tuple[int, Failure]] = []
-    for (who, _), kind in kinds:
-        failure = Failure(clean(kind.worst.case), kind.worst.view, clean(who), kind.count - 1)
-        in_turn.append((turns[who], failure))
-        turns[who] += 1
-    in_turn.sort(key=lambda item: item[0])
-    shown = [failure for _, failure in in_turn[:MOST_FAILURES]]
+    found = in_turns(
+        (who, Failure(clean(kind.worst.case), kind.worst.view, clean(who), kind.count - 1))
+        for (who, _), kind in kinds
+    )
+    shown = found[:MOST_FAILURES]
     return shown, max(0, len(kinds) - MOST_FAILURES)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
+from itertools import takewhile
 from pathlib import Path
 
 import pytest
@@ -14,10 +15,11 @@ from harness.baseline.run_folder import RunFolder, read_run
 from harness.ci.findings import findings
 from harness.ci.github import line_of, workflow_commands
 from harness.ci.junit import junit
-from harness.ci.markdown import markdown, plain
+from harness.ci.markdown import PICTURE, markdown, plain
 from harness.errors import RendererFailed
 from harness.record import AgainstBaseline, BaselineState, Check, Verdict
 from harness.report import write_report
+from harness.report.checks import check_view
 from harness.run import run
 from tests.fakes import FakeRenderer
 from tests.fakes.student import CAPABILITIES, student
@@ -113,7 +115,64 @@ def test_markdown_names_what_is_red_and_who(finished: RunFolder) -> None:
     red = len(list(findings(finished)))
     assert f"❌ Refraction: {red} of" in text
     assert "| slab\\-offset" in text
-    assert "crashing is failed" in text
+    assert "**crashing** fails its preflight" in text
+
+
+def lines_of(text: str, start: str) -> list[list[str]]:
+    """The cells of a table's lines, from the one below the rule under the head `start`."""
+    lines = text.splitlines()
+    first = next(k for k, line in enumerate(lines) if line.startswith(start)) + 2
+    table = takewhile(lambda line: line.startswith("|"), lines[first:])
+    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in table]
+
+
+def test_markdown_tells_failures_that_are_alike_once_and_of_each_who_is_off(
+    finished: RunFolder,
+) -> None:
+    told = lines_of(markdown(finished), "| who is off")
+    assert {line[0] for line in told[:2]} == {"inverted", "crashing"}
+    assert len({(line[0], line[1], line[2].split(":")[0]) for line in told}) == len(told)
+    more = sum(int(line[4] or 0) for line in told)
+    assert len(told) + more == len(list(findings(finished)))
+
+
+def test_markdown_has_the_figures_of_the_pictures_that_differ_most(tmp_path: Path) -> None:
+    renderers = [student(), student(name="also"), student(INVERTED, name="inverted")]
+    run(prepared("ball"), renderers, renderers[0], tmp_path)
+    write_report(tmp_path)
+    finished = read_run(tmp_path)
+    (line,) = lines_of(
+        markdown(finished), "| case | pictures"
+    )  # the pairs of the wrong one are two
+    assert "inverted" in line[1]
+    (case,) = finished.summary.cases
+    pair = [c for c in case.checks if f"{c.renderer} − {c.against}" == line[1]]
+    assert pair
+    for name, figure in zip(PICTURE, line[2:], strict=True):
+        shown = [check_view(check) for check in pair if check.observable == name]
+        assert figure == "–" or all(plain(view.main) in figure for view in shown)
+        for view in shown:
+            assert figure.startswith("**") is (view.check.status is Verdict.FAIL)
+
+
+def test_markdown_stays_short_however_much_is_red(finished: RunFolder) -> None:
+    reasons = iter(range(10**6))
+    cases = [
+        case.model_copy(
+            update={
+                "checks": [
+                    c.model_copy(update={"reason": f"{next(reasons)} {'x' * 99}", "status": status})
+                    for c in case.checks
+                    for status in (Verdict.ERROR,) * 500
+                ]
+            }
+        )
+        for case in finished.summary.cases
+    ]
+    summary = finished.summary.model_copy(update={"cases": cases})
+    text = markdown(RunFolder(finished.folder, summary, finished.records))
+    assert next(reasons) > 5000
+    assert len(text.encode()) < 20_000
 
 
 @pytest.mark.parametrize("verdicts", [{Verdict.FAIL}, set()])
