@@ -54,12 +54,39 @@ def misfit(world: World, evidence: Evidence) -> Float:
     """
     form = ClosedForm(world.scene, world.law)
     with np.errstate(all="ignore"):
-        paths = world.finish(world.rays, form.follow(world.rays, evidence.setting.path))
+        paths = form.follow(world.rays, evidence.setting.path)
+        paths = world.finish(world.rays, _turned_back(form, world.rays, paths))
         if isinstance(evidence, Levels):
             found = _of_levels(world, form, paths, evidence)
         else:
             found = _of_landings(form, paths, evidence)
         return found if world.lost is None else np.where(world.lost(paths)[:, None], 1.0, found)
+
+
+def _turned_back(form: ClosedForm, rays: Rays, paths: TruePaths) -> TruePaths:
+    """The paths, and where no light gets in at the first interface that of the reflection.
+
+    No renderer has another ray to follow there, so it shows where this one leads, whatever path
+    was asked for.
+    """
+    turned = (paths.status == Status.TIR) & paths.total[:, :1].any(axis=1)
+    if not turned.any():
+        return paths
+    back = form.follow(rays, "R")
+    turned &= back.weight > 0
+
+    each = turned[:, None]
+    return replace(
+        paths,
+        status=np.where(turned, back.status, paths.status),
+        origin=np.where(each, back.origin, paths.origin),
+        direction=np.where(each, back.direction, paths.direction),
+        medium=np.where(turned, back.medium, paths.medium),
+        weight=np.where(turned, back.weight, paths.weight),
+        absorbed=np.where(each, back.absorbed, paths.absorbed),
+        inside=np.where(turned, back.inside, paths.inside),
+        ahead=np.where(turned, back.ahead, paths.ahead),
+    )
 
 
 def _of_levels(world: World, form: ClosedForm, paths: TruePaths, evidence: Levels) -> Float:

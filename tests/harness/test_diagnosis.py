@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from harness.diagnosis.evidence import Evidence, Landings, Levels, Setting
 from harness.diagnosis.hypothesis import plus_minus
 from harness.diagnosis.library import BY_ID, LIBRARY
 from harness.diagnosis.whole_run import Witness, diagnose_run
-from harness.diagnosis.worlds import World
+from harness.diagnosis.worlds import World, misfit
 from harness.plan import prepare
 from harness.record import Diagnosis, Summary
 from harness.renderers.base import Rays, Status
@@ -105,12 +106,12 @@ def test_summary_and_records_survive_being_written(tmp_path: Path) -> None:
 # --- every hypothesis knows itself ----------------------------------------------------------------
 
 
-def setting(case: str, probe: int = 0, scenes: Path = SCENES) -> Setting:
+def setting(case: str, probe: int = 0, scenes: Path = SCENES, count: int = 96) -> Setting:
     prepared = prepare(find([case], scenes)[0])
     chosen = prepared.loaded.model.probes[probe]
     scene = expand_thin_slabs(prepared.scene)
     rays = primary_rays(scene)
-    rows = np.linspace(0, len(rays.origins) - 1, 96).astype(int)
+    rows = np.linspace(0, len(rays.origins) - 1, count).astype(int)
     form = ClosedForm(scene)
     some = Rays(rays.origins[rows], rays.directions[rows])
     paths = form.follow(some, chosen.path)
@@ -123,10 +124,14 @@ def setting(case: str, probe: int = 0, scenes: Path = SCENES) -> Setting:
     )  # fmt: skip
 
 
+def form_of(world: World) -> ClosedForm:
+    return ClosedForm(world.scene, world.law)
+
+
 def shown_by(world: World, light: bool, noise: np.random.Generator) -> Evidence:
     """What a renderer of that world shows, with errors spread over the tolerances."""
     asked = world.setting
-    form = ClosedForm(world.scene, world.law)
+    form = form_of(world)
     paths = world.finish(world.rays, form.follow(world.rays, asked.path))
     on = [form.land(paths, plane) for plane in asked.planes]
     lands = np.all([landing.status == Status.HIT for landing in on], axis=0)
@@ -227,6 +232,30 @@ def test_water_in_water_tells_whether_surroundings_are_as_wrong_as_solids(name: 
     assert found.cause is not None
     assert found.cause.id == name
     assert found.unexplained == []
+
+
+def test_rays_that_do_not_get_in_are_expected_where_they_are_reflected_to() -> None:
+    """A ball that should not be there, but is a little thinner than air, reflects at its rim."""
+    asked = setting("identity*=1]", scenes=scenes_root(), count=64**2)
+    wrong = BY_ID["index"].world(World.right(asked), (-0.01,))
+    right = form_of(wrong).follow(wrong.rays, asked.path)
+    back = form_of(wrong).follow(wrong.rays, "R")
+    rim = right.status == Status.TIR
+    assert rim.sum() > 3
+    shown = shown_by(wrong, False, np.random.default_rng(9))
+    assert isinstance(shown, Landings)
+    on = [form_of(wrong).land(back, plane) for plane in asked.planes]
+    there = np.all([landing.status == Status.HIT for landing in on], axis=0) & rim
+    assert there.any()
+    point = np.where(there[:, None], on[0].point, shown.point)
+    direction = np.where(there[:, None], back.direction, shown.direction)
+    seen = replace(shown, point=point, direction=direction, seen=shown.seen | there)
+    found = diagnose("it", [seen])
+    assert found is not None
+    assert found.cause is not None
+    assert found.cause.id == "index"
+    assert found.cause.value == pytest.approx(-0.01, abs=1e-7)
+    assert abs(misfit(wrong, seen)).max() < 1
 
 
 def test_two_faults_are_two_diagnoses() -> None:
