@@ -145,8 +145,8 @@ class Lane:
 
     def _render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         """An image for the calibration, which a run that was killed may have made before."""
-        job = Job(self.renderer.name, "calibration", scene, settings)
-        if (known := self._memo.result(job)) is not None and isinstance(known.result, Image):
+        key = self._memo.key(Job(self.renderer.name, "calibration", scene, settings))
+        if (known := self._memo.result(key)) is not None and isinstance(known.result, Image):
             return known.result
         start = time.perf_counter()
         try:
@@ -154,16 +154,17 @@ class Lane:
         except RendererFailed as failure:
             _blame_the_disk(failure)
             raise
-        self._memo.keep(job, image, time.perf_counter() - start)
+        self._memo.keep(key, image, time.perf_counter() - start)
         return image
 
     def _perform(self, case: int, job: Job) -> Done:
-        if (known := self._memo.result(job)) is not None:
+        key = self._memo.key(job)
+        if (known := self._memo.result(key)) is not None:
             return Done(case, job, known.result, known.seconds, reused=True)
         start = time.perf_counter()
         result = perform(self.renderer, job)
         seconds = time.perf_counter() - start
-        self._memo.keep(job, result, seconds)
+        self._memo.keep(key, result, seconds)
         return Done(case, job, result, seconds)
 
 

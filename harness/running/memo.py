@@ -17,6 +17,7 @@ from harness.renderers.base import Renderer, RenderSettings
 from harness.running.parcel import (
     Parcel,
     job_key,
+    load_packers,
     pack_contender,
     pack_result,
     unpack_contender,
@@ -51,22 +52,30 @@ class Memo:
         if self.cache is not None and contender.absent is None:
             self.cache.put(self._calibration_key(settings), pack_contender(contender), {})
 
-    def result(self, job: Job) -> Known | None:
-        """What the job delivered before."""
+    def key(self, job: Job) -> str:
+        """What the job's result is known by.
+
+        Found before the job is done, since what is finished must be kept at once: whatever else
+        is done first is time in which a kill loses it.
+        """
+        return job_key(job, self.fingerprint)
+
+    def result(self, key: str) -> Known | None:
+        """What the job of `key` delivered before. Where there is nothing, gets ready to `keep`."""
         if self.cache is None:
             return None
-        entry = self.cache.get(job_key(job, self.fingerprint))
+        entry = self.cache.get(key)
         if entry is None:
+            load_packers()
             return None
         return Known(unpack_result(Parcel(entry.meta, entry.blocks)), entry.meta["wall_s"])
 
-    def keep(self, job: Job, result: Result, seconds: float) -> None:
+    def keep(self, key: str, result: Result, seconds: float) -> None:
         """Keeps a result, but no error: it costs little to meet again, and may not happen again."""
         if self.cache is None or isinstance(result, Exception):
             return
         parcel = pack_result(result)
-        meta = {**parcel.meta, "wall_s": seconds}
-        self.cache.put(job_key(job, self.fingerprint), meta, parcel.blocks)
+        self.cache.put(key, {**parcel.meta, "wall_s": seconds}, parcel.blocks)
 
     def _calibration_key(self, settings: RenderSettings) -> str:
         told = (str(settings.samples), str(settings.seed), code_digest("harness.preflight"))

@@ -1,7 +1,8 @@
 """A run in a process of its own, to be killed: ``killable.py OUT CACHE LOG [CASE…]``.
 
 Two students, one that is remembered from run to run and one that is not, append a line to LOG as
-each of their images is finished. Prints the summary's verdicts at the end.
+each of their images is finished: who, what, and when by the machine's monotonic clock. Prints the
+summary's verdicts at the end.
 """
 
 # ruff: noqa: T201
@@ -12,6 +13,7 @@ import hashlib
 import json
 import os
 import sys
+import time
 from pathlib import Path
 
 from harness.cache.cache import open_cache
@@ -37,7 +39,7 @@ class Logged(FakeRenderer):
     def render(self, scene: ResolvedScene, settings: RenderSettings) -> Image:
         image = super().render(scene, settings)
         what = hashlib.sha256(scene.model_dump_json().encode()).hexdigest()[:16]
-        os.write(self._log, f"{self.name} {what}\n".encode())
+        os.write(self._log, f"{self.name} {what} {time.monotonic()}\n".encode())
         return image
 
 

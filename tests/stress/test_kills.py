@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import random
 import signal
+import statistics
 import subprocess
 import sys
 import time
@@ -63,12 +65,13 @@ class Place:
             case.id: [[c.id, str(c.status), c.value] for c in case.checks] for case in summary.cases
         }
 
-    def images(self) -> list[str]:
-        """A line per finished image, in order: the renderer's name and the scene's hash."""
-        return self.log.read_text().splitlines() if self.log.exists() else []
+    def images(self) -> list[tuple[str, float]]:
+        """Finished images in order: the renderer's name and the scene's hash, and when (s)."""
+        lines = self.log.read_text().splitlines() if self.log.exists() else []
+        return [(what, float(when)) for what, when in (line.rsplit(" ", 1) for line in lines)]
 
     def rendered(self) -> Counter[str]:
-        return Counter(self.images())
+        return Counter(what for what, _ in self.images())
 
     def records(self) -> list[CaseRecord]:
         return [record.read_case(path) for path in sorted((self.out / "records").glob("*.json"))]
@@ -96,21 +99,21 @@ class Ledger:
     """
 
     seen: int = 0  # lines of the log
-    finished: set[str] = field(default_factory=set)
-    owed: set[str] = field(default_factory=set)
-    again: int = 0
+    finished: dict[str, float] = field(default_factory=dict)  # when
+    owed: dict[str, float] = field(default_factory=dict)  # for how long it was finished, s
+    again: list[float] = field(default_factory=list)  # the same, of those that were made again
 
-    def check(self, place: Place) -> None:
+    def check(self, place: Place, killed_at: float) -> None:
         """Takes in what was rendered since; the last of each renderer may be made once more."""
         lines = place.images()
         new, self.seen = lines[self.seen :], len(lines)
-        for line in new:
-            if line in self.finished:
-                assert line in self.owed, f"{line} was kept and is rendered again: {new}"
-                self.owed.remove(line)
-                self.again += 1
-            self.finished.add(line)
-        self.owed |= set({line.split()[0]: line for line in new}.values())
+        for what, when in new:
+            if what in self.finished:
+                assert what in self.owed, f"{what} was kept and is rendered again: {new}"
+                self.again.append(self.owed.pop(what))
+            self.finished[what] = when
+        last = {what.split()[0]: (what, when) for what, when in new}
+        self.owed |= {what: killed_at - when for what, when in last.values()}
 
 
 def timeless(written: CaseRecord) -> CaseRecord:
@@ -118,8 +121,10 @@ def timeless(written: CaseRecord) -> CaseRecord:
     return written.model_copy(update={"started": "", "wall_s": 0.0, "runs": runs})
 
 
-def kill_after(place: Place, images: int, delay_s: float) -> bool:
-    """Starts a run, kills it `delay_s` after it has rendered so many more images; False: too late.
+def kill_after(place: Place, images: int, delay_s: float) -> float | None:
+    """Starts a run, kills it `delay_s` after it has rendered so many more images.
+
+    Returns when, by the monotonic clock; None where the run had ended.
 
     Images rather than seconds, since a run takes longer to start than to work.
     """
@@ -130,10 +135,11 @@ def kill_after(place: Place, images: int, delay_s: float) -> bool:
     time.sleep(delay_s)
     if process.poll() is not None:
         process.communicate()
-        return False
+        return None
     os.kill(process.pid, signal.SIGKILL)
+    killed_at = time.monotonic()
     process.communicate()
-    return not place.is_over()
+    return None if place.is_over() else killed_at
 
 
 @pytest.mark.slow
@@ -143,16 +149,16 @@ def test_killed_again_and_again_a_run_ends_as_if_nothing_had_happened(tmp_path: 
     expected = whole.rendered()
     assert set(expected.values()) == {1}
     wanted, dice = count(4, 100), random.Random(6)
-    kills = rounds = twice = 0
+    kills, rounds, again = 0, 0, list[float]()
     while kills < wanted:
         place = Place(tmp_path / f"round-{rounds}")
         rounds += 1
         ledger = Ledger()
         while kills < wanted:
             images = dice.randint(0, max(2, expected.total() // 3))
-            killed = kill_after(place, images, dice.random() * 0.03)
-            ledger.check(place)
-            if not killed:
+            killed_at = kill_after(place, images, dice.random() * 0.03)
+            ledger.check(place, killed_at or math.inf)
+            if killed_at is None:
                 break
             kills += 1
             check_what_is_there(place)
@@ -161,13 +167,23 @@ def test_killed_again_and_again_a_run_ends_as_if_nothing_had_happened(tmp_path: 
         else:
             assert place.finish() == verdicts
             assert not (place.out / UNFINISHED).exists()
-            ledger.check(place)
-        assert ledger.finished == set(expected)
-        twice += ledger.again
+            ledger.check(place, math.inf)
+        assert ledger.finished.keys() == expected.keys()
+        again += ledger.again
         assert list(map(timeless, place.records())) == list(map(timeless, whole.records()))
     note(
         "kill -9 of a run", "at a random moment, then the same command again", kills,
         f"{rounds} runs, all ended with the verdicts and records of a run that was not killed; "
-        f"of {expected.total()} images each, {twice} in all were made again: they were finished "
-        "but not yet kept when the kill came",
+        f"{told_again(again, rounds * expected.total())}",
     )  # fmt: skip
+
+
+def told_again(ages: list[float], images: int) -> str:
+    """What is told of the images that were made twice, finished for so many seconds."""
+    if not ages:
+        return f"none of {images} images was made again once it was finished"
+    return (
+        f"of {images} images, {len(ages)} were made again: their renderer had handed them over "
+        f"{statistics.median(ages) * 1e3:.0f} ms before the kill (median; at most "
+        f"{max(ages) * 1e3:.0f} ms), and they were still in memory"
+    )
