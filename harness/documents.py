@@ -30,7 +30,7 @@ class Model(BaseModel):
 PARTIAL = re.compile(r"\..+\.[a-z0-9_]{8}")
 
 
-def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
+def write_pieces(path: Path, pieces: Iterable[bytes | memoryview]) -> None:
     """Writes all of `pieces` or nothing: to a temporary name beside `path`, then renamed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
@@ -44,7 +44,7 @@ def write_pieces(path: Path, pieces: Iterable[bytes]) -> None:
         raise
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_bytes(path: Path, data: bytes | memoryview) -> None:
     """Writes all of `data` or nothing, like `write_pieces`."""
     write_pieces(path, (data,))
 

@@ -62,9 +62,11 @@ def connected(text: str) -> Iterator[Cluster]:
     _silence()
     with contextlib.ExitStack() as stack:
         address: Any = text
+        direct = None  # left to Dask: whether workers can be reached past the scheduler
         if local is not None:
             # A lost worker is ours to notice and count, not Dask's to try again in silence.
             stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
+            direct = True  # they are here; images would else be unpacked and packed on their way
             address = stack.enter_context(
                 distributed.LocalCluster(
                     n_workers=int(local[1]), threads_per_worker=1, processes=True,
@@ -72,7 +74,9 @@ def connected(text: str) -> Iterator[Cluster]:
                 )
             )  # fmt: skip
         try:
-            client = stack.enter_context(distributed.Client(address, timeout=CONNECT_S))
+            client = stack.enter_context(
+                distributed.Client(address, timeout=CONNECT_S, direct_to_workers=direct)
+            )
         except OSError as error:
             raise ConnectionLost(f"no scheduler answers at {text}: {error}") from error
         yield Cluster(client, text)
