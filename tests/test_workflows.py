@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,27 @@ WORKFLOWS = sorted(
 )
 PINNED = re.compile(r"uses: \S+@[0-9a-f]{40} # v\d+(\.\d+)*$")
 OURS = re.compile(r"uses: snellcheck/snellcheck@")  # in documents: whoever reads knows which
+
+
+EXAMPLE = "docs/examples/renderer-ci/.gitlab-ci.yml"
+# Schemas that came with the checker: nothing is fetched.
+SCHEMAS = {
+    "action.yml": "vendor.github-actions",
+    EXAMPLE: "vendor.gitlab-ci",
+    **dict.fromkeys(WORKFLOWS, "vendor.github-workflows"),
+}
+
+
+def fits_its_schema(file: Path, schema: str) -> subprocess.CompletedProcess[str]:
+    checker = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", schema]
+    return subprocess.run([*checker, str(file)], capture_output=True, text=True, check=False)
+
+
+def audited(*files: Path) -> subprocess.CompletedProcess[str]:
+    """What zizmor finds wrong with workflows and actions, without asking anybody."""
+    zizmor = Path(sys.executable).with_name("zizmor")
+    options = ["--offline", "--no-config", "--strict-collection", "--no-progress"]
+    return subprocess.run([zizmor, *options, *files], capture_output=True, text=True, check=False)
 
 
 def workflow(file: str) -> dict[str, Any]:
@@ -80,3 +103,48 @@ def test_all_use_the_same_version_of_an_action(file: str) -> None:
     actions = [used.partition("@")[0] for used in everywhere]
     assert uses(file)
     assert len(actions) == len(set(actions))
+
+
+# --- as others see them -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", SCHEMAS)
+def test_it_is_what_the_service_reads(file: str) -> None:
+    done = fits_its_schema(ROOT / file, SCHEMAS[file])
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("file", "right", "wrong"),
+    [
+        (".github/workflows/ci.yml", "runs-on:", "run-on:"),
+        ("action.yml", "using: composite", "using: composit"),
+        (EXAMPLE, "script:", "scripts:"),
+    ],
+)
+def test_a_misspelt_one_is_noticed(file: str, right: str, wrong: str, tmp_path: Path) -> None:
+    text = (ROOT / file).read_text(encoding="utf-8")
+    assert right in text
+    broken = tmp_path / Path(file).name
+    broken.write_text(text.replace(right, wrong), encoding="utf-8")
+    done = fits_its_schema(broken, SCHEMAS[file])
+    assert done.returncode == 1
+    assert broken.name in done.stdout
+
+
+def test_an_audit_finds_nothing_in_them() -> None:
+    done = audited(*(ROOT / file for file in (*WORKFLOWS, "action.yml")))
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_the_audit_would_find_something(tmp_path: Path) -> None:
+    """A branch's name that is run as a command, for one."""
+    text = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
+    broken = tmp_path / ".github" / "workflows" / "ci.yml"
+    broken.parent.mkdir(parents=True)
+    given = "run: echo ${{ github.head_ref }} "
+    broken.write_text(re.sub(r"run: (?=.ci)", given, text, count=1), encoding="utf-8")
+    assert given in broken.read_text(encoding="utf-8")
+    done = audited(broken)
+    assert done.returncode > 10  # by severity; lower ones are failures of its own
+    assert "template-injection" in done.stdout
