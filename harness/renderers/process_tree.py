@@ -257,11 +257,13 @@ def _limit(pid: int, output_mb: int, cpu_s: float | None) -> None:
         return
     import resource
 
-    limits = {resource.RLIMIT_FSIZE: output_mb * 2**20, resource.RLIMIT_CORE: 0}
+    size = output_mb * 2**20
+    limits = {resource.RLIMIT_FSIZE: (size, size), resource.RLIMIT_CORE: (0, 0)}
     if cpu_s is not None:
-        limits[resource.RLIMIT_CPU] = int(cpu_s) + 1
-    for limit, value in limits.items():
+        # The signal that says what happened comes at the first, the one that ends all at the other.
+        limits[resource.RLIMIT_CPU] = (int(cpu_s) + 1, int(cpu_s) + 2)
+    for limit, values in limits.items():
         _, hard = resource.prlimit(pid, limit)
-        value = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        soft, last = values if hard == resource.RLIM_INFINITY else (min(v, hard) for v in values)
         with contextlib.suppress(ProcessLookupError, PermissionError, ValueError):
-            resource.prlimit(pid, limit, (value, value))
+            resource.prlimit(pid, limit, (soft, last))

@@ -156,6 +156,20 @@ def test_processes_of_a_renderer_talk_to_each_other(private: Path) -> None:
     assert python(code, private).stdout == "well\n"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="abstract sockets are Linux's")
+@has_scopes
+def test_nobody_outside_is_reached_by_a_socket_without_a_file(private: Path) -> None:
+    """One with a file can be, which docs/decisions/0018-confined-by-the-kernel.md tells."""
+    address = f"\0snellcheck-{os.getpid()}"
+    code = f"import socket; socket.socket(socket.AF_UNIX).connect({address!r}); print('connected')"
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(address)
+        listening.listen()
+        done = python(code, private)
+    assert "connected" not in done.stdout
+    assert "PermissionError" in done.stderr
+
+
 @has_scopes
 def test_signals_reach_nobody_outside(private: Path) -> None:
     code = f"import os, signal; os.kill({os.getpid()}, signal.SIGCONT)"

@@ -50,6 +50,26 @@ def test_output_exit_code_and_times(tmp_path: Path) -> None:
     assert done.cpu_s > 0
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="processor time is limited on Linux alone")
+def test_threads_that_burn_processor_time_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A limit beside that of wall time, for what more threads than cores may take in it.
+
+    With a tenth of a core it is 2 s for 20 s of wall time, and two threads are there in one or two.
+    """
+    monkeypatch.setattr(os, "cpu_count", lambda: 0.1)
+    code = (
+        "import hashlib, threading\n"
+        "data = bytes(2**26)\n"  # hashed without the interpreter's lock
+        "def burn():\n"
+        "    while True: hashlib.sha256(data)\n"
+        "for _ in range(2): threading.Thread(target=burn).start()\n"
+    )
+    with pytest.raises(RendererFailed, match="used more than 2 s of processor time"):
+        run_limited([sys.executable, "-c", code], cwd=tmp_path, timeout_s=20, memory_mb=512)
+
+
 def test_stdin_larger_than_a_pipe_arrives_whole(tmp_path: Path) -> None:
     code = "import sys; data = sys.stdin.buffer.read(); print(len(data), data[-1])"
     assert python(code, tmp_path, bytes(3_000_000) + b"\x07").stdout == "3000001 7\n"
