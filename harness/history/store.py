@@ -150,15 +150,20 @@ class History:
     def before(self, run: Summary, folder: Path) -> list[Deviations]:
         """The deviations of the runs into `folder` before `run`, of its quality, oldest first.
 
-        In the order in which they were added, whatever the machine's clock said. Raises InputError.
+        In the order in which they were added, whatever the machine's clock said; all of them for a
+        run that was not added. Raises InputError.
         """
         measured = ", ".join(f"'{status.value}'" for status in MEASURED)
         with self._reading() as db:
             runs = db.execute(
-                "SELECT id FROM runs WHERE folder = ? AND quality = ? AND started != ? "
-                "ORDER BY id DESC LIMIT ?",
-                (_place(folder), run.quality, run.started, MOST_BEFORE),
-            ).fetchall()
+                "SELECT id FROM runs WHERE folder = :folder AND quality = :quality AND id < "
+                "(SELECT coalesce(min(id), 9e18) FROM runs "
+                "WHERE folder = :folder AND started = :started) ORDER BY id DESC LIMIT :most",
+                {
+                    "folder": _place(folder), "quality": run.quality, "started": run.started,
+                    "most": MOST_BEFORE,
+                },
+            ).fetchall()  # fmt: skip
             rows = [
                 db.execute(
                     "SELECT case_id, check_id, value, expected, tolerance FROM checks WHERE run = ?"

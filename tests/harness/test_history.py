@@ -107,6 +107,9 @@ def test_the_runs_before_one_are_those_of_its_folder_and_quality(
     before = history.before(begun("now"), here)
     assert before == [deviations(summary)] * 2
     assert before[0]
+    assert len(history.before(begun("0"), here)) == 1  # what came later is not before it
+    assert history.before(begun("3"), here) == []
+    assert len(history.before(begun("not added"), here)) == 3
 
 
 def test_a_damaged_history_is_put_aside(history: History, summary: Summary, tmp_path: Path) -> None:
