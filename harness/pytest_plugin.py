@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 RENDERERS = "--snellcheck-renderer"
 COMMANDS = "--snellcheck-renderer-command"
 CONFIGS = "--snellcheck-renderer-config"
+BASELINE = "--snellcheck-baseline"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -41,6 +42,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--snellcheck-out", default="reports/pytest", metavar="DIR",
         help="where records and pages go, from the root folder (default: reports/pytest)",
+    )  # fmt: skip
+    group.addoption(
+        BASELINE, metavar="DIR|GIT-REV|RUN",
+        help="judge against what was approved, as `snellcheck check` does; renderers that were "
+        "never approved for a case, by their verdicts",
     )  # fmt: skip
 
 

@@ -12,11 +12,17 @@ from typing import Any
 import pytest
 
 from harness.archive import folder_name
+from harness.baseline.compare import compare
+from harness.baseline.outcome import outcome, write_outcome
 from harness.baseline.run_folder import read_run
-from harness.ci.findings import findings
+from harness.baseline.select import of_run
+from harness.baseline.shown import show_pictures
+from harness.baseline.source import Baselines, open_baselines
+from harness.baseline.store import store_at
+from harness.ci.findings import findings, lost
 from harness.ci.reuse import Reused, reused
 from harness.cores import core_count
-from harness.errors import InputError, SnellcheckError
+from harness.errors import InputError, Problem, SnellcheckError
 from harness.plan import prepare
 from harness.record import Verdict
 from harness.renderers import registry
@@ -34,6 +40,7 @@ class Bench:
 
     renderers: list[Reused]
     helper: Reused
+    baselines: Baselines | None
 
     @classmethod
     def of(cls, config: pytest.Config) -> Bench:
@@ -50,7 +57,25 @@ class Bench:
         ]
         renderers = [reused(one) for one in (*map(registry.create, names), *own)]
         helper = next((r for r in renderers if r.name == HELPER), None)
-        return cls(renderers, helper or reused(registry.create(HELPER)))
+        return cls(renderers, helper or reused(registry.create(HELPER)), approved(config))
+
+
+def approved(config: pytest.Config) -> Baselines | None:
+    """What the session is to be held against; none where it was not asked for.
+
+    Raises InputError where there is nothing in it: every case would be new, and pass or fail as if
+    nobody had asked.
+    """
+    where = config.getoption("--snellcheck-baseline")
+    if where is None:
+        return None
+    folder = config.rootpath / where
+    store = store_at(os.environ.get("SNELLCHECK_STORE", ""))
+    found = open_baselines(str(folder) if folder.exists() else where, store)
+    if not found.kept:
+        problem = Problem("nothing was approved there", key="--snellcheck-baseline", value=where)
+        raise InputError([problem, *found.unreadable])
+    return found
 
 
 BENCH = pytest.StashKey[Bench]()
@@ -98,6 +123,18 @@ class SceneFile(pytest.File):
             yield CaseItem.from_parent(self, name=case.id, case=case)
 
 
+def against(baselines: Baselines, out: Path) -> None:
+    """Writes into the run in `out` how it stands to what was approved of its cases and renderers.
+
+    Renderers that were approved and do not take part in the session are not missed.
+    """
+    run = read_run(out)
+    names = set(run.summary.renderers)
+    compared = compare(run, baselines, of_run(run, lambda _, renderer: renderer in names))
+    found = outcome(compared, baselines.source, [])
+    write_outcome(show_pictures(run, baselines), compared, found)
+
+
 class CaseFailed(Exception):
     """What is red, ready to be shown."""
 
@@ -122,8 +159,12 @@ class CaseItem(pytest.Item):
             [prepared], found.renderers, helper, out,
             quality=config.getoption("--snellcheck-quality"), threads=threads, command="pytest",
         )  # fmt: skip
+        if found.baselines is not None:
+            against(found.baselines, out)
         write_report(out)
-        red = [finding.text for finding in findings(read_run(out))]
+        read = read_run(out)
+        red = [finding.text for finding in findings(read)]
+        red += [f"{what}: {reason}" for _, what, reason in lost(read.summary)]
         if red:
             raise CaseFailed("\n\n".join(red))
         checks = [check for case in summary.cases for check in case.checks]

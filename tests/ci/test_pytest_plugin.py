@@ -76,6 +76,43 @@ def test_failures_say_what_is_wrong_and_where_to_look(project: Path) -> None:
 
 
 @pytest.mark.slow
+def test_against_what_was_approved_only_changes_are_red(project: Path) -> None:
+    """As `snellcheck check`: a failure that somebody approved with a reason is green."""
+    break_it(project)
+    only, against = ("scenes/snell", "-p", "no:cacheprovider"), "--snellcheck-baseline=references"
+    assert judged(project, *only).returncode == 1
+    (out,) = (project / "reports" / "pytest").iterdir()
+    command = (
+        "approve",
+        "*",
+        "--run",
+        str(out),
+        "--reason",
+        "not mended yet",
+        "--by",
+        "Willebrord",
+    )
+    snellcheck = Path(sys.executable).with_name("snellcheck")
+    approved = subprocess.run(
+        [snellcheck, *command], cwd=project, capture_output=True, text=True, check=False
+    )
+    assert approved.returncode == 0, approved.stderr
+    assert judged(project, *only).returncode == 1
+    same = judged(project, *only, against)
+    assert same.returncode == 0, same.stdout
+    assert "1 passed" in same.stdout
+    # A case that nobody approved is judged by its verdicts.
+    assert "2 failed" in judged(project, "scenes/slab", against).stdout
+    # It grows.
+    worse_mu = (INVERTED[0], f"{INVERTED[1]} * 1.2")
+    source = SOURCE.read_text(encoding="utf-8")
+    (project / "student.py").write_text(with_faults(source, worse_mu), encoding="utf-8")
+    worse = judged(project, *only, against)
+    assert worse.returncode == 1
+    assert "regressed" in worse.stdout
+
+
+@pytest.mark.slow
 def test_workers_share_the_cases(project: Path) -> None:
     done = judged(project, "scenes", "-n", "2")
     assert done.returncode == 0, done.stdout
@@ -100,10 +137,13 @@ def test_what_is_wrong_with_a_scene_is_told_with_its_line(project: Path) -> None
         ("--snellcheck-renderer=trecer", "did you mean tracer"),
         ("--snellcheck-renderer-config=none.toml", "cannot be read"),
         ("--snellcheck-renderer-command=x {what}", "what"),
+        ("--snellcheck-renderer=tracer --snellcheck-baseline=scenes", "nothing was approved there"),
+        ("--snellcheck-renderer=tracer --snellcheck-baseline=nowhere", "neither a folder nor a"),
     ],
 )
 def test_a_wrong_option_is_one_message(option: str, said: str, project: Path) -> None:
-    done = run(project, "scenes", option)
+    renderer, *more = option.split(" --")
+    done = run(project, "scenes", renderer, *(f"--{one}" for one in more))
     assert done.returncode == 4  # pytest's code for bad usage
     assert said in done.stderr + done.stdout
 
