@@ -19,8 +19,14 @@ Bend = Callable[[Interface], tuple[Float, Mask]]
 
 
 def _with_indices(world: World, change: Callable[[float], float]) -> World:
+    """Surroundings of 1 are no medium whose index anybody reads; others are."""
+    around = world.scene.media[0].ior
+    return _with_media(world, change, 0 if around != 1 else 1)
+
+
+def _with_media(world: World, change: Callable[[float], float], first: int) -> World:
     media = [
-        m.model_copy(update={"ior": max(1e-3, change(m.ior))}) if k else m
+        m.model_copy(update={"ior": max(1e-3, change(m.ior))}) if k >= first else m
         for k, m in enumerate(world.scene.media)
     ]
     return replace(world, scene=world.scene.model_copy(update={"media": tuple(media)}))
@@ -30,16 +36,11 @@ def _with_indices(world: World, change: Callable[[float], float]) -> World:
 
 
 def _index(world: World, a: Values) -> World:
-    """Surroundings of 1 are no glass whose index anybody reads; water is, which leaves ratios."""
-    wrong = _solids_index(world, a)
-    around, *solids = wrong.scene.media
-    if around.ior != 1:
-        around = around.model_copy(update={"ior": around.ior * (1 + a[0])})
-    return replace(wrong, scene=wrong.scene.model_copy(update={"media": (around, *solids)}))
+    return _with_indices(world, lambda n: n * (1 + a[0]))
 
 
 def _solids_index(world: World, a: Values) -> World:
-    return _with_indices(world, lambda n: n * (1 + a[0]))
+    return _with_media(world, lambda n: n * (1 + a[0]), 1)
 
 
 def _says_index(fit: Fitted, whose: str = "every index") -> str:
@@ -265,14 +266,14 @@ def _lawless(
 def _lawless_pair(
     name: str, direction: Callable[[Interface], Float], text: str
 ) -> tuple[Hypothesis, Hypothesis]:
-    """A wrong direction that always exists, and the same where reflection is not total."""
+    """A wrong direction where reflection is not total, and one that always exists."""
     return (
-        _lawless(name, lambda at: (direction(at), np.zeros(len(at.leg), bool)), text),
         _lawless(
             f"{name}-but-total",
             lambda at: (direction(at), snell(at)[1]),
             f"{text}, but where all light is reflected",
         ),
+        _lawless(name, lambda at: (direction(at), np.zeros(len(at.leg), bool)), text),
     )
 
 

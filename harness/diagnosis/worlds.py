@@ -114,6 +114,8 @@ def _of_landings(form: ClosedForm, paths: TruePaths, evidence: Landings) -> Floa
         turn = paths.direction - evidence.direction
         figures.append(turn / evidence.direction_tolerance[:, None])
     aside = 0.1 * max(planes[0].size) / evidence.point_tolerance
-    other = np.where(lands == evidence.seen, 0.0, aside)
+    # Where physics lets no light pass, a wrong law of directions does not say whether any does.
+    unsaid = lands & ~(paths.weight > 0)
+    other = np.where((lands == evidence.seen) | unsaid, 0.0, aside)
     found = np.concatenate(figures, axis=1)
     return np.where(both[:, None], np.nan_to_num(found), other[:, None])

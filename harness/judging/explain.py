@@ -106,9 +106,13 @@ def unfitted(renderer: str, checks: Sequence[Check]) -> Diagnosis | None:
 # Of the cases in which a renderer is right, as many are asked what they say against a cause.
 MOST_WITNESSES = 24
 WITNESS_RAYS = 48
-BOUNDARIES = {
-    Observable.TIR, Observable.CRITICAL_ANGLE, Observable.FIRST_TRANSMITTING_ANGLE
-}  # fmt: skip
+# Checks that look at each ray of their probe, and so speak for all of them. Others look at where
+# light ends, at an extremum, at rays of one height, or at an angle whatever side it is on.
+EVERY_RAY = frozenset({
+    Observable.EXIT_POINT, Observable.EXIT_DIRECTION, Observable.INTERNAL_ANGLE,
+    Observable.SLAB_OFFSET, Observable.STACK_OFFSET, Observable.DEVIATION,
+    Observable.FOLDED_DIRECTION, Observable.REFLECTANCE, Observable.TRANSMITTANCE,
+})  # fmt: skip
 # A renderer that passed deviates by less than its tolerances: as a rule by less than these, and
 # by less than the errors of single precision, which grow near a critical angle.
 POINT_TOLERANCE, DIRECTION_TOLERANCE, LEVEL_TOLERANCE = 1e-4, 1e-4, 1e-3
@@ -210,8 +214,8 @@ def _witnesses(
 
 
 def _measuring(case: PreparedCase) -> list[model.Probe]:
-    """The probes of which every ray is checked, not only where light ends."""
-    used = {c.probe for c in case.loaded.model.checks if c.observable not in BOUNDARIES}
+    """The probes of which every ray is checked."""
+    used = {c.probe for c in case.loaded.model.checks if c.observable in EVERY_RAY}
     return [
         probe
         for probe in case.loaded.model.probes
@@ -221,7 +225,7 @@ def _measuring(case: PreparedCase) -> list[model.Probe]:
 
 def _only_directions(case: PreparedCase, probe: model.Probe) -> bool:
     used = {c.observable for c in case.loaded.model.checks if c.probe == probe.name}
-    return used <= DIRECTION_OBSERVABLES | BOUNDARIES
+    return used & EVERY_RAY <= DIRECTION_OBSERVABLES
 
 
 @dataclass(frozen=True)

@@ -206,12 +206,12 @@ def test_a_case_without_deviation_speaks_against_a_cause() -> None:
     assert diagnosed is not None
     (alone,) = diagnose_run("it", {"face": diagnosed}, [])
     assert alone.cause is not None
-    assert alone.cause.id == "straight-on"
+    assert alone.cause.id == "straight-on-but-total"  # on the way in the same
     right = Witness("slab", (shown_by(World.right(slab), False, noise),))
     (doubted,) = diagnose_run("it", {"face": diagnosed}, [right])
     assert doubted.cause is None
     assert doubted.runner_up is not None
-    assert doubted.runner_up.id == "straight-on"
+    assert doubted.runner_up.id == "straight-on-but-total"
     assert "would explain 1 of 1, but slab, where it would show, is right" in doubted.sentence
 
 
@@ -256,6 +256,22 @@ def test_rays_that_do_not_get_in_are_expected_where_they_are_reflected_to() -> N
     assert found.cause.id == "index"
     assert found.cause.value == pytest.approx(-0.01, abs=1e-7)
     assert abs(misfit(wrong, seen)).max() < 1
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_wrong_direction_is_named_whether_or_not_its_rays_have_light(dark: bool) -> None:
+    """Some renderers weigh light by the angles that they have wrong, some by the right ones."""
+    asked = setting("slab-offset*0.25*")
+    wrong = BY_ID["ratio-inverted"].world(World.right(asked), ())
+    weight = form_of(wrong).follow(wrong.rays, asked.path).weight
+    shown = shown_by(wrong, False, np.random.default_rng(10))
+    assert isinstance(shown, Landings)
+    assert (shown.seen & (weight == 0)).sum() > len(weight) / 10
+    seen = shown.seen & (weight > 0) if dark else shown.seen
+    found = diagnose("it", [replace(shown, seen=seen)])
+    assert found is not None
+    assert found.cause is not None
+    assert found.cause.id == "ratio-inverted"
 
 
 def test_two_faults_are_two_diagnoses() -> None:
