@@ -19,6 +19,7 @@ from harness.judging.judge import Judgement
 from harness.judging.results import Contender, Results
 from harness.measure.images import Pixels
 from harness.packing import write_pack
+from harness.packing_ways import PictureWays, unusable
 from harness.plan import PreparedCase
 from harness.probe.scenes import AXES
 from harness.probe.view import view_of_codes, view_of_rays
@@ -91,8 +92,9 @@ class Archive:
         ]
         pack = f"data/{name}.js"
         write_pack(
-            self.root / pack, loaded.id, _pictures(case, contenders, results), judgement.rays
-        )
+            self.root / pack, loaded.id, _pictures(case, contenders, results), judgement.rays,
+            *_ways(case, contenders, results),
+        )  # fmt: skip
         written = CaseRecord(
             id=loaded.id,
             case=loaded.case,
@@ -162,7 +164,10 @@ class Archive:
         settings: RenderSettings,
     ) -> RendererRun:
         mine = {role: r for (who, role), r in results.by_role.items() if who == contender.name}
-        errors = [r for r in mine.values() if isinstance(r, RendererError)]
+        # Nothing is judged on the ways of rays: without them a diagram is missing, and no more.
+        errors = [
+            r for role, r in mine.items() if isinstance(r, RendererError) and role != plan.WAYS
+        ]
         status, reason = Verdict.PASS, contender.reason
         if contender.stored is not None:
             status = worst([c.status for c in judgement.checks if c.renderer == contender.name])
@@ -320,6 +325,28 @@ def _pictures(
         for role, pixels in _shown(case, mine):
             found[contender.name, role] = np.asarray(pixels, np.float32)
     return found
+
+
+def _ways(
+    case: PreparedCase, contenders: list[Contender], results: Results
+) -> tuple[list[PictureWays], dict[str, str]]:
+    """The ways of the pictures' rays, and why there are none of the other renderers."""
+    found, silent = [], {}
+    for contender in contenders:
+        if not case.wants_ways(contender.name):
+            continue
+        told = results.by_role.get((contender.name, plan.WAYS))
+        if isinstance(told, RayPaths):
+            scene = plan.scene_of_ways(case, contender.capabilities)
+            if problem := unusable(told, len(plan.way_pixels(scene.film))):
+                silent[contender.name] = problem
+            else:
+                found.append(PictureWays(contender.name, scene, plan.way_step(scene.film), told))
+        elif isinstance(told, RendererError):
+            silent[contender.name] = str(told)
+        else:
+            silent[contender.name] = contender.reason or "it does not tell where its rays go"
+    return found, silent
 
 
 def scene_text(case: PreparedCase) -> str:

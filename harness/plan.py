@@ -10,13 +10,16 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from harness.measure.furnace import is_furnace
 from harness.measure.observables import IMAGE_OBSERVABLES, Observable
 from harness.measure.statistics import samples_needed
 from harness.preflight import Preflight
 from harness.probe.scenes import AXES, all_light_scene, code_scene, light_scene, ramp_scene
 from harness.renderers import registry
-from harness.renderers.base import Capability, RenderSettings
+from harness.renderers.base import MAIN_WAY, Capability, RenderSettings
 from harness.scene import model
 from harness.scene.findings import SceneInvalid, input_error
 from harness.scene.load import LoadedCase
@@ -37,6 +40,9 @@ IMAGE = "image"
 SECOND_IMAGE = "image, second seed"
 BASE_IMAGE = "unshifted"
 AREA_IMAGE = "area"
+WAYS = "image, main ways"
+# Rays of a picture that can be looked at, per side of the film.
+MOST_WAYS = 48
 SHIFTED = ("shifted left", "shifted right", "shifted up", "shifted down")
 # Samples per pixel of the picture of a path's light, by `samples_needed`.
 LIGHT_SAMPLES = samples_needed()
@@ -49,7 +55,10 @@ AREA_FACTOR = 4
 
 @dataclass(frozen=True)
 class Job:
-    """One render of `scene`, or with `path` one trace of its camera's rays along that path."""
+    """One render of `scene`, or with `path` one trace of its camera's rays along that path.
+
+    Of rays that take the `MAIN_WAY` there are those of `way_pixels`.
+    """
 
     renderer: str
     role: str
@@ -112,6 +121,12 @@ class PreparedCase:
         """The probes that checks of `renderer` need."""
         used = {c.probe for c in self.loaded.model.checks if asks(c, renderer)}
         return [probe for probe in self.loaded.model.probes if probe.name in used]
+
+    def wants_ways(self, renderer: str) -> bool:
+        """Whether a picture by `renderer` is shown whose rays no probe follows."""
+        probes = self.asked_probes(renderer)
+        lit = bool(probes) and all(probe.measure != "position" for probe in probes)
+        return self.wants_image(renderer) or lit
 
     @property
     def wants_radiance(self) -> bool:
@@ -204,7 +219,30 @@ def jobs_of(
             jobs += [
                 Job(renderer, role, made_scene, asked, path) for role, made_scene, path in made
             ]
+    if case.wants_ways(renderer) and Capability.MAIN_WAY in capabilities:
+        jobs.append(Job(renderer, WAYS, scene_of_ways(case, capabilities), settings, MAIN_WAY))
     return jobs
+
+
+def scene_of_ways(case: PreparedCase, capabilities: Collection[Capability]) -> ResolvedScene:
+    """In which the rays of a picture are followed: with a spectrum, in the middle of it."""
+    scene = scene_for(case.scene, capabilities)
+    if not case.passes:
+        return scene
+    _, media = case.passes[len(case.passes) // 2]
+    return scene.model_copy(update={"media": media})
+
+
+def way_step(film: Film) -> int:
+    """Every so many pixels, in both directions, has its ray followed."""
+    return -(-max(film.width, film.height) // MOST_WAYS)
+
+
+def way_pixels(film: Film) -> NDArray[np.int64]:
+    """The pixels whose rays are followed, row by row: numbers of row * width + column."""
+    step = way_step(film)
+    pixels = np.arange(film.height * film.width).reshape(film.height, film.width)
+    return np.asarray(pixels[::step, ::step].reshape(-1), np.int64)
 
 
 def light_samples(scene: ResolvedScene, samples: int) -> int:

@@ -36,7 +36,7 @@ LAYERS = (
     ("report",),
     ("plan",),
     ("judging",),
-    ("baseline", "packing", "archive"),
+    ("baseline", "packing", "packing_solids", "packing_ways", "archive"),
     ("running", "run"),
     ("history",),
     ("doctor", "ci"),

@@ -19,12 +19,17 @@ from harness.scene.resolved import ResolvedScene
 
 Float = NDArray[np.float64]
 
+# Instead of a path's letters: through whatever transmits, and back from whatever does not, until
+# the ray lands.
+MAIN_WAY = "*"
+
 
 class Capability(enum.StrEnum):
     """What a renderer claims to model. A scene that needs more is a SKIP with the reason."""
 
     IMAGE = "image"  # can write images
     RAYS = "rays"  # offers trace()
+    MAIN_WAY = "main-way"  # trace() takes MAIN_WAY for a path, and tells what happens on it
     PIXEL_CENTRES = "pixel-centres"  # samples exactly the pixel centre; no noise
     DOUBLE = "double"  # float64 arithmetic; others are taken to be float32
     DOUBLE_DATA = "double-data"  # keeps indices and vertices in float64, too
@@ -83,7 +88,9 @@ class RayPaths:
     `status` (n,) int8 of `Status`; `surface` (n,) int32 index into scene.surfaces or -1;
     `point` (n, 3) where it landed, NaN unless HIT; `direction` (n, 3) last travel direction;
     `weight` (n,) product of Fresnel factors; `optical_length` (n,) sum of ior * length.
-    `vertices` (n, k, 3), NaN-padded, is there only when asked for.
+    `vertices` (n, k, 3), NaN-padded, and `meetings` (n, k, 3) are there only where the main way is
+    asked for: cos_theta_i, cos_theta_t and R at each vertex, NaN where there is none, cos_theta_t
+    also in total reflection and at mirrors, R also at what is no interface.
     """
 
     status: NDArray[np.int8]
@@ -93,6 +100,7 @@ class RayPaths:
     weight: Float
     optical_length: Float
     vertices: Float | None = None
+    meetings: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -184,5 +192,6 @@ class RayTracingRenderer(Renderer, Protocol):
         """Follows each ray along `path`, a letter per interface: T transmit, R reflect.
 
         After the last letter the ray must land on a surface; interfaces beyond the path are CUT.
+        Who claims `Capability.MAIN_WAY` is asked for that, too.
         """
         ...

@@ -28,10 +28,12 @@ from harness.temporary import temporary_folder
 
 ImageFormat = Literal["exr", "pfm", "npy", "png", "ppm"]
 
-# What a renderer is taken to claim that does not say. RAYS needs the persistent protocol; the
-# others are rare, and wrongly assumed they would spoil measurements rather than fail them.
+# What a renderer is taken to claim that does not say. RAYS and MAIN_WAY need the persistent
+# protocol; the others are rare, and wrongly assumed they would spoil measurements rather than fail
+# them.
 USUAL_CLAIMS = frozenset(Capability) - {
     Capability.RAYS,
+    Capability.MAIN_WAY,
     Capability.DOUBLE,
     Capability.DOUBLE_DATA,
     Capability.LOBE_SWITCH,

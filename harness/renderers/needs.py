@@ -32,8 +32,8 @@ def needs(scene: ResolvedScene) -> frozenset[Capability]:
     """The capabilities that `scene` cannot be rendered rightly without.
 
     Rectangles, disks and emission are taken for granted. Capabilities that say how a result is
-    to be read (PIXEL_CENTRES, LOBE_SWITCH, RADIANCE_N2) or that a check needs (RAYS) are not
-    here.
+    to be read (PIXEL_CENTRES, LOBE_SWITCH, RADIANCE_N2) or that a check or a diagram needs
+    (RAYS, MAIN_WAY) are not here.
     """
     return frozenset(_reasons(scene))
 

@@ -154,7 +154,7 @@ class WorkerRenderer:
             files = {"scene": scene_file, "rays": given, "output": output}
             reply = self._ask("trace", settings, path=path, **files)
             try:
-                return wire.read_paths(output, len(rays.origins), reply.vertices)
+                return wire.read_paths(output, len(rays.origins), reply.vertices, reply.meetings)
             except (OSError, ValueError, EOFError) as error:
                 message = f"{self.name} wrote unusable ray paths: {error}"
                 raise RendererFailed(message, log=reply.log) from error

@@ -6,11 +6,20 @@ import time
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import tracer
 from harness.errors import RendererFailed
 from harness.record import write_text
-from harness.renderers.base import Capability, Health, Image, RayPaths, Rays, RenderSettings
+from harness.renderers.base import (
+    MAIN_WAY,
+    Capability,
+    Health,
+    Image,
+    RayPaths,
+    Rays,
+    RenderSettings,
+)
 from harness.scene import resolved
 from harness.scene.resolved import ResolvedScene
 
@@ -52,15 +61,17 @@ class TracerEngine:
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
     ) -> RayPaths:
-        """Follows rays along `path`; nobody asks a worker for vertices."""
+        """Follows rays along `path`, or the main way; of that the vertices are kept."""
         from harness.translate.tracer import translate
 
+        main = path == MAIN_WAY
         try:
             found = tracer.follow(
                 translate(scene),
                 rays.origins,
                 rays.directions,
-                path,
+                None if main else path,
+                vertices=main,
                 threads=settings.threads,
             )
         except tracer.SceneError as error:
@@ -72,6 +83,7 @@ class TracerEngine:
             direction=found.direction,
             weight=found.weight,
             optical_length=found.optical_length,
+            **(_log(found) if main else {}),
         )
 
     def emit(self, scene: ResolvedScene, folder: Path) -> Path:
@@ -89,6 +101,15 @@ class TracerEngine:
         usable = bool((pixels == np.float32(0.5)).all())
         detail = "" if usable else f"a grey world of 0.5 was rendered as {pixels.mean():.6g}"
         return Health(self.name, usable, self.version(), str(Path(tracer.__file__).parent), detail)
+
+
+def _log(found: tracer.Paths) -> dict[str, NDArray[np.float64]]:
+    """What happened on the ways, no longer than the longest of them."""
+    used = int(np.isfinite(found.vertices[..., 0]).sum(axis=1).max(initial=1))
+    meetings = np.full((len(found.vertices), used, 3), np.nan)
+    told = np.stack([found.cos_theta_i, found.cos_theta_t, found.reflectance], axis=-1)
+    meetings[:, 1:] = told[:, : used - 1]
+    return {"vertices": found.vertices[:, :used], "meetings": meetings}
 
 
 def _grey_world() -> ResolvedScene:

@@ -40,6 +40,7 @@ class Reply(BaseModel):
     closest: Path | None = None
     cut: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
     vertices: Path | None = None
+    meetings: Path | None = None
     file: Path | None = None
     # health
     usable: bool = True
@@ -61,8 +62,8 @@ def read_rays(path: Path) -> Rays:
     return Rays(np.ascontiguousarray(both[:, :3]), np.ascontiguousarray(both[:, 3:]))
 
 
-def write_paths(path: Path, paths: RayPaths) -> Path | None:
-    """Writes (n, 10) float64; returns the file of vertices where there are any."""
+def write_paths(path: Path, paths: RayPaths) -> dict[str, Path]:
+    """Writes (n, 10) float64; returns the files of vertices and meetings where there are any."""
     columns = (
         paths.status[:, None],
         paths.surface[:, None],
@@ -72,14 +73,17 @@ def write_paths(path: Path, paths: RayPaths) -> Path | None:
         paths.optical_length[:, None],
     )
     np.save(path, np.concatenate(columns, axis=1).astype("<f8"), allow_pickle=False)
-    if paths.vertices is None:
-        return None
-    vertices = path.with_name(f"{path.stem}.vertices.npy")
-    np.save(vertices, paths.vertices.astype("<f8"), allow_pickle=False)
-    return vertices
+    files = {}
+    for name, table in (("vertices", paths.vertices), ("meetings", paths.meetings)):
+        if table is not None:
+            files[name] = path.with_name(f"{path.stem}.{name}.npy")
+            np.save(files[name], table.astype("<f8"), allow_pickle=False)
+    return files
 
 
-def read_paths(path: Path, count: int, vertices: Path | None) -> RayPaths:
+def read_paths(
+    path: Path, count: int, vertices: Path | None, meetings: Path | None = None
+) -> RayPaths:
     """Raises ValueError where the files do not hold `count` ray paths."""
     table = _read(path, 10)
     if len(table) != count:
@@ -95,16 +99,17 @@ def read_paths(path: Path, count: int, vertices: Path | None) -> RayPaths:
         direction=np.ascontiguousarray(table[:, 5:8]),
         weight=table[:, 8].copy(),
         optical_length=table[:, 9].copy(),
-        vertices=None if vertices is None else _read_vertices(vertices, count),
+        vertices=None if vertices is None else _read_legs(vertices, "vertices", count),
+        meetings=None if meetings is None else _read_legs(meetings, "meetings", count),
     )
 
 
-def _read_vertices(path: Path, count: int) -> Float:
-    vertices = np.load(path, allow_pickle=False)
-    shape = vertices.shape
-    if vertices.dtype.kind != "f" or len(shape) != 3 or (shape[0], shape[2]) != (count, 3):
-        raise ValueError(f"expected vertices ({count}, k, 3) float64, got {shape} {vertices.dtype}")
-    return np.asarray(vertices, dtype=np.float64)
+def _read_legs(path: Path, name: str, count: int) -> Float:
+    table = np.load(path, allow_pickle=False)
+    shape = table.shape
+    if table.dtype.kind != "f" or len(shape) != 3 or (shape[0], shape[2]) != (count, 3):
+        raise ValueError(f"expected {name} ({count}, k, 3) float64, got {shape} {table.dtype}")
+    return np.asarray(table, dtype=np.float64)
 
 
 def _read(path: Path, columns: int) -> Float:

@@ -118,8 +118,8 @@ class Server:
         rays = wire.read_rays(Path(request["rays"]))
         settings = _settings(request)
         paths = self.engine.trace(_scene(request), rays, request["path"], settings)
-        vertices = wire.write_paths(Path(request["output"]), paths)
-        return {} if vertices is None else {"vertices": str(vertices)}
+        files = wire.write_paths(Path(request["output"]), paths)
+        return {name: str(file) for name, file in files.items()}
 
     def _emit(self, request: Message) -> Message:
         return {"file": str(self.engine.emit(_scene(request), Path(request["folder"])))}

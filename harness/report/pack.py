@@ -73,7 +73,13 @@ def array(values: NDArray[np.floating], bits: int = FOR_DRAWING) -> dict[str, An
     return {"shape": list(values.shape), "data": squeezed(stored)}
 
 
-def write(path: Path, case_id: str, images: Sequence[Image], probes: Sequence[Any] = ()) -> Path:
+def write(
+    path: Path,
+    case_id: str,
+    images: Sequence[Image],
+    probes: Sequence[Any] = (),
+    ways: Mapping[str, Any] | None = None,
+) -> Path:
     """Writes the pack of a case. The same data give the same bytes. Returns `path`."""
     position = {entry: k for k, entry in enumerate(images)}
     pack = {
@@ -81,6 +87,7 @@ def write(path: Path, case_id: str, images: Sequence[Image], probes: Sequence[An
         "case": case_id,
         "images": [entry.entry(position) for entry in images],
         "probes": list(probes),
+        **({"ways": ways} if ways else {}),
     }
     # JSON is JavaScript; "<" never stands in it, so that it may also be put into a page.
     text = json.dumps(pack, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")

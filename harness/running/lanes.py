@@ -18,17 +18,26 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from harness.cache.cache import Cache
 from harness.errors import ConnectionLost, RendererError, RendererFailed, RendererMissing
 from harness.judging.results import FAILED_PREFLIGHT, Contender, Result
-from harness.plan import Job
+from harness.plan import Job, way_pixels
 from harness.preflight import Render, preflight
 from harness.record import Verdict
-from harness.renderers.base import Image, RayTracingRenderer, Renderer, RenderSettings
+from harness.renderers.base import (
+    MAIN_WAY,
+    Image,
+    Rays,
+    RayTracingRenderer,
+    Renderer,
+    RenderSettings,
+)
 from harness.renderers.process_tree import Running, belong_to
 from harness.running.memo import Memo, memo_of
 from harness.scene.resolved import ResolvedScene
-from harness.truth.camera import primary_rays
+from harness.truth.camera import primary_rays, rays_through
 
 # With less room than this in the temporary folder, a failure that sounds like it is the disk's, and
 # with hardly any room every failure is: not all programs say what kept them from writing.
@@ -191,13 +200,21 @@ def _performed(renderer: Renderer, job: Job) -> Result:
             return replace(image, seconds=image.seconds or time.perf_counter() - start)
         if not isinstance(renderer, RayTracingRenderer):
             return RendererFailed(f"{renderer.name} claims to trace rays but cannot")
-        return renderer.trace(job.scene, primary_rays(job.scene), job.path, job.settings)
+        return renderer.trace(job.scene, _rays_of(job), job.path, job.settings)
     except RendererError as error:
         return error
     except ConnectionLost:
         raise
     except ANYTHING as error:
         return RendererFailed(_described(error))
+
+
+def _rays_of(job: Job) -> Rays:
+    """The camera's rays, through all pixel centres or, for main ways, through a grid of them."""
+    if job.path != MAIN_WAY:
+        return primary_rays(job.scene)
+    row, column = np.divmod(way_pixels(job.scene.film), job.scene.film.width)
+    return rays_through(job.scene, column + 0.5, row + 0.5)
 
 
 def _blame_the_disk(failure: RendererFailed) -> None:

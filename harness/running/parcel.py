@@ -47,6 +47,7 @@ _PATHS: tuple[str, ...] = (
     "weight",
     "optical_length",
     "vertices",
+    "meetings",
 )
 
 

@@ -29,7 +29,8 @@ class FakeRenderer:
         picture: Picture = grey,
         *,
         error: Exception | None = None,
-        capabilities: frozenset[Capability] = frozenset(Capability) - {Capability.RAYS},
+        capabilities: frozenset[Capability] = frozenset(Capability)
+        - {Capability.RAYS, Capability.MAIN_WAY},
     ) -> None:
         self.name = name
         self.capabilities = capabilities

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,11 +15,15 @@ from hypothesis.extra.numpy import arrays
 
 from harness import imagefile
 from harness import record as records
-from harness.packing import _solid
+from harness.packing_solids import drawn_solid
+from harness.packing_ways import MIRRORED, TOTAL, TRANSMITTED, happened, onward, unusable
+from harness.record import Verdict
+from harness.renderers.base import Capability, RayPaths, Status
 from harness.renderers.registry import create
 from harness.report import pack
 from harness.scene.resolved import Frame, Lens, Solid
-from tests.harness.tiny import run_tiny
+from tests.fakes.student import CAPABILITIES, student
+from tests.harness.tiny import passes_at, run_tiny
 from tests.harness.unpack import floats, pixels, read_pack
 
 ANY = st.floats(width=32, allow_nan=True, allow_infinity=True)
@@ -92,11 +99,112 @@ def test_rays_know_their_error_and_their_way(tmp_path: Path) -> None:
     assert np.abs(first - last)[:, landed].max() < 1e-3
 
 
+def test_the_rays_of_a_picture_are_refracted_as_by_a_ball(tmp_path: Path) -> None:
+    """By the closed form of a unit ball: a ray that passes its centre at b meets it at asin(b).
+
+    The stored angles have 20 significant bits. Near the rim the angle's slope 1 / sqrt(1 - b^2)
+    multiplies the rounding of float64, which is far below that.
+    """
+    tracer = create("tracer")
+    run_tiny(tmp_path, tracer, cases=["ball"], helper=tracer)
+    (path,) = (tmp_path / "data").glob("*.js")
+    ways = read_pack(path)["ways"]
+    (rays,) = ways["rays"]
+    assert (rays["name"], ways["silent"]) == ("tracer", [])
+    across, down = np.meshgrid(
+        np.arange(0, rays["width"], rays["step"]), np.arange(0, rays["height"], rays["step"])
+    )
+    (ball,) = rays["solids"]
+    assert (ball["center"], ball["radius"]) == ([0, 0, 0], 1)
+    (scene,) = (tmp_path / "scenes").glob("*.json")
+    camera = json.loads(scene.read_text("utf-8"))["camera"]
+    b = passes_at(camera, across.ravel(), down.ravel(), rays["width"], rays["height"])
+    meets = b < 1
+    assert 0.1 < meets.mean() < 0.9
+    theta_i, theta_t, events = (
+        floats(rays[name]["data"]).reshape(rays[name]["shape"])
+        for name in ("thetaI", "thetaT", "events")
+    )
+    first = np.degrees(np.arcsin(b[meets]))
+    inner = np.degrees(np.arcsin(b[meets] / rays["media"][1]["ior"]))
+    bits = 2.0**-19
+    for seen, expected in zip((*theta_i, *theta_t), (first, inner, inner, first), strict=True):
+        assert np.abs(seen[meets] / expected - 1).max() < bits
+        assert np.isnan(seen[~meets]).all()
+    assert (events[:, meets] == TRANSMITTED).all()
+
+
+def way(direction: tuple[float, float, float], meeting: tuple[float, float, float]) -> RayPaths:
+    """Comes down the diagonal, meets a level face at the origin, and leaves the scene."""
+    vertices = np.array([[[-1.0, 1, 0], [0, 0, 0]]])
+    meetings = np.full((1, 2, 3), np.nan)
+    meetings[0, 1] = meeting
+    return RayPaths(
+        status=np.array([Status.MISS], np.int8), surface=np.array([-1], np.int32),
+        point=np.full((1, 3), np.nan), direction=np.array([direction]) / np.sqrt(2),
+        weight=np.ones(1), optical_length=np.ones(1), vertices=vertices, meetings=meetings,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("direction", "meeting", "event"),
+    [
+        ((1, -1, 0), (0.5**0.5, 0.5**0.5, 0), TRANSMITTED),
+        ((1, -1, 0), (0.5**0.5, np.nan, np.nan), TRANSMITTED),  # by what is no interface
+        ((1, 1, 0), (0.5**0.5, np.nan, 1), TOTAL),
+        ((1, 1, 0), (0.5**0.5, np.nan, np.nan), MIRRORED),
+    ],
+)
+def test_what_happened_to_a_ray(
+    direction: tuple[float, float, float], meeting: tuple[float, float, float], event: float
+) -> None:
+    paths = way(direction, meeting)
+    vertices = onward(paths)
+    assert paths.meetings is not None
+    assert happened(vertices, paths.meetings).tolist() == [[event]]
+    assert vertices[0, 2] == pytest.approx(np.array(direction))  # as far as it came
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"vertices": None}, "but not their ways"),
+        ({"meetings": np.zeros((1, 3, 3))}, "meetings (1, 3, 3) of 1 rays"),
+        ({"vertices": np.zeros((2, 2, 3)), "meetings": np.zeros((2, 2, 3))}, "of 1 rays"),
+        ({"vertices": np.zeros((1, 0, 3)), "meetings": np.zeros((1, 0, 3))}, "0 vertices"),
+        ({"vertices": np.full((1, 2, 3), np.nan)}, "begin nowhere"),
+        ({"status": np.zeros(0, np.int8)}, "begin nowhere"),
+    ],
+)
+def test_ways_that_cannot_be_drawn_are_not(change: dict[str, Any], reason: str) -> None:
+    paths = way((1, 1, 0), (0.5**0.5, np.nan, 1))
+    assert unusable(paths, 1) == ""
+    assert reason in unusable(replace(paths, **change), 1)
+
+
+def test_ways_that_fail_cost_the_diagram_alone(tmp_path: Path) -> None:
+    """A renderer that claims to tell its rays' ways, but cannot."""
+    boasts = student(capabilities=CAPABILITIES | {Capability.MAIN_WAY})
+    summary = run_tiny(tmp_path, boasts, student(name="other"), cases=["ball"])
+    assert summary.exit_code == 0
+    (path,) = (tmp_path / "records").glob("*.json")
+    run, _ = records.read_case(path).runs
+    assert (run.status, run.reason) == (Verdict.PASS, "")
+    (path,) = (tmp_path / "data").glob("*.js")
+    assert read_pack(path)["ways"] == {
+        "rays": [],
+        "silent": [
+            {"name": "student", "reason": "student claims to trace rays but cannot"},
+            {"name": "other", "reason": "it does not tell where its rays go"},
+        ],
+    }
+
+
 def test_composed_solids_are_drawn_as_closed_triangles() -> None:
     """A biconvex lens, which no other rule of drawing knows: its size is that of the lens."""
     frame = Frame(origin=(1, 2, 3), x=(1, 0, 0), y=(0, 1, 0), z=(0, 0, 1))
     lens = Lens(frame=frame, thickness=0.6, radii=(2.0, -2.0), conics=(0, 0), aperture=0.8)
-    drawn = _solid(Solid(name="lens", shape=lens, medium=1, exterior=0))
+    drawn = drawn_solid(Solid(name="lens", shape=lens, medium=1, exterior=0))
     corners = floats(drawn["corners"]["data"]).reshape(-1, 3)
     triangles = np.array(drawn["triangles"]).reshape(-1, 3)
     assert np.ptp(corners, axis=0) == pytest.approx([1.6, 1.6, 0.6], rel=0.05)

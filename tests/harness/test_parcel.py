@@ -75,6 +75,7 @@ def test_ray_paths(n: int, vertices: bool) -> None:
         weight=rng.random(n),
         optical_length=rng.random(n),
         vertices=rng.random((n, 4, 3)) if vertices else None,
+        meetings=rng.random((n, 4, 3)) if vertices else None,
     )
     back = unpack_result(through_json(pack_result(paths)))
     for field in dataclasses.fields(paths):

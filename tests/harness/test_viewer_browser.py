@@ -23,7 +23,7 @@ from harness.record import CaseRecord
 from harness.report import pack, write_report
 from harness.report.links import page_name
 from tests.harness.report_fixture import make_run, write_run
-from tests.harness.tiny import report_of_dense_glass
+from tests.harness.tiny import passes_at, report_of_dense_glass
 from tests.harness.unpack import floats, read_pack
 
 pytestmark = pytest.mark.browser
@@ -170,6 +170,37 @@ def test_a_pinned_pixel_shows_its_ray(page: Page, run: Path) -> None:
         const [box, all] = [label, label.closest("svg")].map((e) => e.getBoundingClientRect());
         return box.left < all.left || box.right > all.right || box.bottom > all.bottom; }).length"""
     assert page.evaluate(outside) == 0
+
+
+def test_a_pinned_pixel_of_a_picture_shows_its_ray(page: Page, run: Path) -> None:
+    """By the closed form: a ray that passes a unit ball's centre at b meets it at asin(b)."""
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    record = open_case(page, run, "ball", "#pin=13,9")
+    assert record.pack
+    (rays,) = read_pack(run / record.pack)["ways"]["rays"]
+    choose = page.locator("#ray select")
+    assert choose.locator("option").all_inner_texts()[-1] == "picture, as tracer tells"
+    choose.select_option(label="picture, as tracer tells")
+    text = page.locator(".ray-facts").inner_text()
+    found = re.search(r"Ray of pixel \((\d+), (\d+)\)", text)
+    assert found
+    column, row = (int(number) for number in found.groups())
+    step, width, height = rays["step"], rays["width"], rays["height"]
+    assert (column, row) == (round(13 / step) * step, round(9 / step) * step)
+    camera = json.loads((run / record.files["scene.json"]).read_text("utf-8"))["camera"]
+    theta_i = np.degrees(np.arcsin(passes_at(camera, column, row, width, height)))
+    theta_t = np.degrees(np.arcsin(np.sin(np.radians(theta_i)) / rays["media"][1]["ior"]))
+    table = page.locator(".ray-facts .mini-table").first
+    assert table.locator("td.num").all_inner_texts() == [
+        f"{angle:.4f}°" for angle in (theta_i, theta_t, theta_t, theta_i)
+    ]
+    assert table.locator("tbody tr").all_inner_texts()[0].split()[1] == "transmitted"
+    assert page.locator(".section .true-ray").count() == 1
+    assert page.locator(".section circle.solid").count() == 1
+    assert f"{theta_i:.3f}°" in (page.locator(".section").text_content() or "")
+    assert "student: it does not tell where its rays go" in text
+    assert errors == []
 
 
 def test_curves_tell_their_values_and_show_the_ray(page: Page, run: Path) -> None:

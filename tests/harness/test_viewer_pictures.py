@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -29,12 +30,14 @@ FLIP = Path(__file__).parents[1] / "data" / "flip" / "map.json"
 Pixels = NDArray[np.float32]
 
 
-def page_of(root: Path, pictures: Mapping[str, Pixels]) -> str:
+def page_of(
+    root: Path, pictures: Mapping[str, Pixels], ways: Mapping[str, Any] | None = None
+) -> str:
     """The address of a case's page with these pictures."""
     images: list[pack.Image] = []
     for name, pixels in pictures.items():
         images.append(pack.image(name, "image", pixels, images[0] if images else None))
-    pack.write(root / "data" / "given.js", "given", images)
+    pack.write(root / "data" / "given.js", "given", images, ways=ways)
     record = CaseRecord(
         id="given", case="given", family="given", title="Given", scene_sha256="0" * 64,
         scene_file="given/given.toml", quality="draft", snellcheck_version="0.1.0",
@@ -82,6 +85,14 @@ def test_approved_pictures_are_there_to_be_chosen(page: Page, tmp_path: Path) ->
     label = page.locator(".pane canvas").get_attribute("aria-label")
     assert label == "|A − B| of A povray and B baseline: povray"
     assert page.locator("tr[data-off='povray'] td").first.inner_text() == "0.25"
+
+
+def test_where_nobody_tells_its_rays_the_page_says_so(page: Page, tmp_path: Path) -> None:
+    grey = np.full((8, 8, 3), 0.5, np.float32)
+    ways = {"rays": [], "silent": [{"name": "povray", "reason": "<b>it does not tell"}]}
+    open_page(page, page_of(tmp_path, {"povray": grey}, ways) + "#pin=2,3")
+    assert "povray: <b>it does not tell" in page.locator("#ray").inner_text()
+    assert page.locator("#ray select").count() == 0
 
 
 # --- FLIP -----------------------------------------------------------------------------------------

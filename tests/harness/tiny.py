@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from harness.plan import PreparedCase, prepare
 from harness.record import Check, Summary
@@ -39,6 +42,15 @@ def report_of_dense_glass(out: Path, *cases: str) -> Path:
     run_tiny(out, tracer, student(dense), cases=cases, helper=tracer)
     write_report(out)
     return out
+
+
+def passes_at(camera: Mapping[str, Any], x: Any, y: Any, width: int, height: int) -> Any:
+    """How far from the world's origin the rays of pixels (x, y) of a perspective camera pass."""
+    right, up, forward, origin = (np.array(camera[k]) for k in ("right", "up", "forward", "origin"))
+    side = camera["tan_half_fov_x"] * (2 * (np.asarray(x) + 0.5) / width - 1)
+    rise = camera["tan_half_fov_x"] * (1 - 2 * (np.asarray(y) + 0.5) / height) * height / width
+    d = forward + np.multiply.outer(side, right) + np.multiply.outer(rise, up)
+    return np.linalg.norm(np.cross(origin, d), axis=-1) / np.linalg.norm(d, axis=-1)
 
 
 def checks_of(summary: Summary, renderer: str | None = None) -> list[Check]:

@@ -6,7 +6,8 @@ import { h } from "./dom";
 import { bind } from "./keys";
 import { loadPack } from "./load";
 import { MAPS } from "./maps";
-import { decodeImages, type Image } from "./pack";
+import { decodeImages, type Image, type Silent } from "./pack";
+import { RayPanel } from "./raypanel";
 import { Rays } from "./rays";
 import { Viewer } from "./viewer";
 
@@ -31,12 +32,16 @@ export async function startCase(data: CaseData, here: ParentNode): Promise<void>
   try {
     const images: Image[] = [];
     const rays: Rays[] = [];
+    const ways: Rays[] = [];
+    const silent: Silent[] = [];
     for (const source of data.packs) {
       const pack = await loadPack(source.href);
       images.push(...(await decodeImages(pack)).map((i) => ({ ...i, name: source.prefix + i.name })));
       rays.push(...await Promise.all(pack.probes.map((probe) => Rays.decode(probe, source.prefix))));
+      ways.push(...await Promise.all((pack.ways?.rays ?? []).map((one) => Rays.decode(one, source.prefix))));
+      silent.push(...(pack.ways?.silent ?? []).map((one) => ({ ...one, name: source.prefix + one.name })));
     }
-    const viewer = new Viewer(data, images, rays, place);
+    const viewer = new Viewer(data, images, rays, new RayPanel(rays, ways, silent, data.colours, data.ray), place);
     exposeMaps(images);
     (here.querySelector("#pictures") as HTMLElement | null)?.classList.add("viewing");
     readCharts(data.curves, data.colours, rays.length ? (degrees) => viewer.showRay(degrees) : null);

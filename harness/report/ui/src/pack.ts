@@ -47,11 +47,23 @@ export interface StoredProbe {
   }[];
 }
 
+/** The ways of a picture's rays: like a probe's, but each ray has a path of its own. */
+export interface StoredWays extends StoredProbe {
+  readonly events: StoredArray; // 0 transmitted, 1 totally reflected, 2 reflected by a mirror
+}
+
+/** A renderer whose rays are not known, and why. */
+export interface Silent {
+  readonly name: string;
+  readonly reason: string;
+}
+
 export interface StoredPack {
   readonly schema: string;
   readonly case: string;
   readonly images: readonly StoredImage[];
   readonly probes: readonly StoredProbe[];
+  readonly ways?: { readonly rays: readonly StoredWays[]; readonly silent: readonly Silent[] };
 }
 
 export type Vec3 = readonly [number, number, number];

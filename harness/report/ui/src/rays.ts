@@ -1,6 +1,6 @@
 // The rays of a probe, decoded: which one a pixel has, where it went, by how much renderers are off.
 
-import { floats, type StoredProbe, type StoredSolid, type Vec3 } from "./pack";
+import { floats, type StoredProbe, type StoredSolid, type StoredWays, type Vec3 } from "./pack";
 
 export interface Solid {
   readonly name: string;
@@ -16,7 +16,7 @@ export interface Ray {
   readonly x: number; // its pixel
   readonly y: number;
   readonly vertices: readonly Vec3[]; // camera, interfaces, landing, as far as it came
-  readonly letters: string;
+  readonly letters: string; // T transmitted, R reflected, M reflected by a mirror
   readonly thetaI: readonly number[]; // degrees, one per interface that was met
   readonly thetaT: readonly number[];
   readonly weight: number;
@@ -35,9 +35,10 @@ export class Rays {
     readonly errors: ReadonlyMap<string, Float32Array>,
     private readonly arrays: Readonly<Record<string, Float32Array>>,
     private readonly perRenderer: readonly { name: string; shift: Float32Array; turn: Float32Array }[],
+    readonly teller: string, // the renderer whose ways these are; "" for the true ones of a probe
   ) {}
 
-  static async decode(probe: StoredProbe, prefix = ""): Promise<Rays> {
+  static async decode(probe: StoredProbe | StoredWays, prefix = ""): Promise<Rays> {
     const [vertices, thetaI, thetaT, status, weight] = await Promise.all(
       [probe.vertices, probe.thetaI, probe.thetaT, probe.status, probe.weight].map(floats));
     const renderers = await Promise.all(probe.renderers.map(async (r) => ({
@@ -47,9 +48,11 @@ export class Rays {
       turn: await floats(r.turn),
     })));
     const arrays = { vertices, thetaI, thetaT, status, weight } as Record<string, Float32Array>;
+    const told = "events" in probe;
+    if (told) arrays["events"] = await floats(probe.events);
     const errors = new Map(renderers.map((r) => [r.name, r.error]));
     const solids = await Promise.all(probe.solids.map(decodeSolid));
-    return new Rays(probe, solids, errors, arrays, renderers);
+    return new Rays(probe, solids, errors, arrays, renderers, told ? prefix + probe.name : "");
   }
 
   private get columns(): number {
@@ -96,12 +99,15 @@ export class Rays {
     }
     const angles = (name: string): number[] =>
       [...probe.path].map((_, n) => this.at(name, n, k));
-    const met = angles("thetaI").filter(Number.isFinite).length;
+    const known = this.teller ? "events" : "thetaI";
+    const met = angles(known).filter(Number.isFinite).length;
     return {
       x: column * probe.step,
       y: row * probe.step,
       vertices,
-      letters: probe.path.slice(0, met),
+      letters: this.teller
+        ? angles("events").slice(0, met).map((event) => "TRM"[event] ?? "T").join("")
+        : probe.path.slice(0, met),
       thetaI: angles("thetaI").slice(0, met),
       thetaT: angles("thetaT").slice(0, met),
       weight: this.at("weight", 0, k),

@@ -223,6 +223,7 @@ function within(value: number, low: number, high: number): number {
 function interfaceMarks(
   ray: Ray, way: readonly Point[], k: number, frame: Frame, room: Room,
 ): SVGElement[] {
+  if (!Number.isFinite(ray.thetaI[k])) return []; // where a thin slab is left, nobody says
   const here = way[k + 1] as Point;
   const from = way[k] as Point;
   const next = way[k + 2];
@@ -256,7 +257,9 @@ function interfaceMarks(
   if (next && ray.letters[k] === "T") {
     const onward = Math.atan2(next[1] - here[1], next[0] - here[0]);
     parts.push(arc(centre, onward, normal + Math.PI, 26));
-    label(middle(onward, normal + Math.PI), `θₜ ${degrees(ray.thetaT[k])}`);
+    if (Number.isFinite(ray.thetaT[k])) label(middle(onward, normal + Math.PI), `θₜ ${degrees(ray.thetaT[k])}`);
+  } else if (ray.letters[k] === "M") {
+    label(normal + Math.PI, "mirror");
   } else if (!Number.isFinite(ray.thetaT[k] ?? Number.NaN)) {
     label(normal + Math.PI, "total reflection");
   }

@@ -62,7 +62,7 @@ function normalAt(ray: Ray, k: number): Vec3 {
   const d = unit(minus(here, before));
   if (!next) return d;
   const onward = unit(minus(next, here));
-  if (ray.letters[k] === "R") return unit(minus(onward, d));
+  if (ray.letters[k] !== "T") return unit(minus(onward, d));
   const [i, t] = [ray.thetaI[k] ?? 0, ray.thetaT[k] ?? 0].map((a) => Math.sin((a * Math.PI) / 180)) as [number, number];
   return i > 1e-4 ? unit(minus(times(t / i, d), onward)) : d;
 }

@@ -14,7 +14,7 @@ import { arranged } from "./layout";
 import { lostIn, MAPS } from "./maps";
 import type { Image } from "./pack";
 import { type Layer, Pane, type Sheet } from "./pane";
-import { RayPanel } from "./raypanel";
+import type { RayPanel } from "./raypanel";
 import type { Rays } from "./rays";
 import { Sheets } from "./sheets";
 import { fromHash, type Mode, type Pixel, toHash, type ViewState } from "./state";
@@ -37,7 +37,6 @@ export class Viewer {
   private readonly bar = h("div", { class: "bar-row" });
   private readonly notice = h("p", { class: "notice", role: "status" });
   private readonly inspector: Inspector;
-  private readonly rayPanel: RayPanel;
   private readonly controls: Controls;
   private hovered: Pixel | null = null;
   private swipe = 0.5;
@@ -51,7 +50,7 @@ export class Viewer {
 
   constructor(
     private readonly data: CaseData, images: readonly Image[], private readonly rays: readonly Rays[],
-    place: HTMLElement,
+    private readonly rayPanel: RayPanel, place: HTMLElement,
   ) {
     this.images = new Map(images.map((image) => [image.name, image]));
     this.names = [...this.images.keys()];
@@ -63,7 +62,6 @@ export class Viewer {
     };
     this.state = fromHash(readAddress(), this.initial, this.names);
     this.inspector = new Inspector((pixel) => this.jump(pixel), () => this.unpin());
-    this.rayPanel = new RayPanel(rays, data.colours, data.ray);
     this.controls = new Controls(this.names, rays.length > 0, {
       set: (change) => this.update(change),
       fit: () => this.update({ camera: null }),
