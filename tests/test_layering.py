@@ -55,6 +55,7 @@ WORKER_ONLY = TRACER_ADAPTERS | {
     "harness.renderers.mitsuba_lobes",
     "harness.renderers.mitsuba_rays",
     "harness.renderers.mitsuba_sensor",
+    "harness.renderers.mitsuba_ways",
     "harness.renderers.mitsuba_world",
 }
 

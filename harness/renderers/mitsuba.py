@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from harness.errors import RendererMissing, RendererUnsupported
 from harness.renderers import mitsuba_variants as variants
 from harness.renderers.base import (
+    MAIN_WAY,
     Capability,
     Float,
     Health,
@@ -63,6 +64,7 @@ STOCK_CAPABILITIES = frozenset(
 )
 EXACT_CAPABILITIES = STOCK_CAPABILITIES | {
     Capability.RAYS,
+    Capability.MAIN_WAY,
     Capability.PIXEL_CENTRES,
     Capability.LOBE_SWITCH,
     Capability.LENS,
@@ -262,13 +264,17 @@ class ExactEngine(_Engine):
     def trace(
         self, scene: ResolvedScene, rays: Rays, path: str, settings: RenderSettings
     ) -> RayPaths:
-        """Follows rays along `path`; single precision, in float64 arrays."""
+        """Follows rays along `path`, or the main way; single precision, in float64 arrays."""
         from harness.renderers.mitsuba_rays import trace
+        from harness.renderers.mitsuba_ways import follow
 
         scale = length_scale(scene)
         live = self._load(scene, settings)
         scaled_rays = Rays(rays.origins * scale, rays.directions)
-        paths = trace(live.scene, scaled(scene, scale), scaled_rays, path)
+        if path == MAIN_WAY:
+            paths = follow(live.scene, scaled(scene, scale), scaled_rays)
+        else:
+            paths = trace(live.scene, scaled(scene, scale), scaled_rays, path)
         return RayPaths(
             status=paths.status,
             surface=paths.surface,
@@ -276,6 +282,8 @@ class ExactEngine(_Engine):
             direction=paths.direction,
             weight=paths.weight,
             optical_length=paths.optical_length / scale,
+            vertices=None if paths.vertices is None else paths.vertices / scale,
+            meetings=paths.meetings,
         )
 
 
