@@ -17,7 +17,7 @@ from tracer.recursion import Exposure, Limits, Samples, exposure, go_on
 from tracer.scene import Scene
 from tracer.surface import Lobes
 from tracer.threads import Work, for_bands
-from tracer.wave import SIZE, Ray, Wave, nearest_hits, put_ray
+from tracer.wave import PIXEL, SIZE, STRIDE, Ray, Wave, nearest_hits, put_ray
 
 BAND = 4  # rows of samples that a thread takes at a time
 CENTRES = Sampling()
@@ -57,26 +57,34 @@ def _primary_rays(
     Both are counted in one, `at` and up to `end`. Samples of which is known that the wavelength
     does not matter are left as they are.
     """
-    side, n = int(camera[SIDE]), 0
+    side, n, floats, ints = int(camera[SIDE]), 0, wave.floats, wave.ints
     points = side * side
+    pixel, k = at // points, at % points
+    i, j = pixel % film.width, film.first + pixel // film.width
     while n < SIZE and at < end:
-        pixel, k = at // points, at % points
-        if k == 0:
-            if samples.disperses[pixel] == 0:
-                at += points
-                continue
-            samples.disperses[pixel], samples.cut[pixel], samples.closest[pixel] = 0, 0.0, np.inf
-            for c in range(3):
-                samples.radiance[pixel, c] = 0.0
-        x, y = pixel_centre(
-            pixel % film.width, film.first + pixel // film.width, film.width, film.height
-        )
-        u, v = lens_point(k, side)
+        if k == 0 and samples.disperses[pixel] == 0:
+            at, k = at + points, points
+        else:
+            if k == 0:
+                samples.disperses[pixel], samples.cut[pixel] = 0, 0.0
+                samples.closest[pixel] = np.inf
+                for c in range(3):
+                    samples.radiance[pixel, c] = 0.0
+            floats[n], floats[STRIDE + n] = pixel_centre(i, j, film.width, film.height)
+            u, v = lens_point(k, side) if points > 1 else (0.0, 0.0)
+            floats[2 * STRIDE + n], floats[3 * STRIDE + n] = u, v
+            ints[PIXEL + n] = pixel
+            n, at, k = n + 1, at + 1, k + 1
+        if k == points:
+            pixel, k, i = pixel + 1, 0, i + 1
+            if i == film.width:
+                i, j = 0, j + 1
+    for m in range(min(n, SIZE)):  # for LLVM to make several at once
+        x, y, u, v = floats[m], floats[STRIDE + m], floats[2 * STRIDE + m], floats[3 * STRIDE + m]
         o, d = primary_ray(camera, x, y, u, v)
-        ray = Ray(o, d, (1.0, 1.0, 1.0), pixel, 1, UNKNOWN, NOTHING, -1, False)
-        put_ray(wave, n, ray)
-        n += 1
-        at += 1
+        put_ray(
+            wave, m, Ray(o, d, (1.0, 1.0, 1.0), ints[PIXEL + m], 1, UNKNOWN, NOTHING, -1, False)
+        )
     return n, at
 
 

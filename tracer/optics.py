@@ -52,9 +52,8 @@ def cos_transmitted(cos_theta_i: float, ior_i: float, ior_t: float) -> tuple[boo
     """
     tangential = ior_i / ior_t * cos_theta_i
     q = (ior_t - ior_i) * (ior_t + ior_i) / (ior_t * ior_t) + tangential * tangential
-    if q < 0.0:
-        return False, 0.0
-    return True, math.sqrt(q)
+    # No branch: LLVM takes several roots at once, but none where one may be left out.
+    return q >= 0.0, math.sqrt(max(q, 0.0))
 
 
 @compiled

@@ -31,7 +31,7 @@ from tracer.optics import (
 )
 from tracer.patterns import pattern_radiance
 from tracer.shapes import face_coordinates, vec_at
-from tracer.vector import Vec, along, dot, scale
+from tracer.vector import Vec, along, chosen, dot, scale
 
 BLACK = (0.0, 0.0, 0.0)
 
@@ -68,10 +68,9 @@ def interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float,
     cos_theta_i = max(0.0, dot(wi, n))
     transmits, cos_theta_t = cos_transmitted(cos_theta_i, ior_i, ior_t)
     wr = reflect(wi, n)
-    if not transmits:
-        return False, 1.0, wr, wr
     R = fresnel_unpolarised(cos_theta_i, cos_theta_t, ior_i, ior_t)
-    return True, R, wr, transmitted(wi, n, cos_theta_i, cos_theta_t, ior_i / ior_t)
+    wt = transmitted(wi, n, cos_theta_i, cos_theta_t, ior_i / ior_t)
+    return transmits, R if transmits else 1.0, wr, chosen(transmits, wt, wr)
 
 
 @called

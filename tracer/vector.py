@@ -58,5 +58,11 @@ def along(origin: Vec, t: float, direction: Vec) -> Vec:
 
 
 @compiled
+def chosen(first: bool, a: Vec, b: Vec) -> Vec:
+    """One of two, without a branch."""
+    return a[0] if first else b[0], a[1] if first else b[1], a[2] if first else b[2]
+
+
+@compiled
 def normalise(a: Vec) -> Vec:
     return scale(1.0 / math.sqrt(dot(a, a)), a)

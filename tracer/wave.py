@@ -30,7 +30,7 @@ from tracer.hit import (
     surface_left,
 )
 from tracer.shapes import INF, vec_at
-from tracer.vector import Vec, dot
+from tracer.vector import Vec, dot, sub
 
 Ints = NDArray[np.int64]
 
@@ -159,7 +159,7 @@ def nearest_hits(scene: Arrays, wave: Wave, n: int, fresh: bool, scratch: Scratc
     those that are `fresh` from the camera do not.
     """
     floats, ints = wave.floats, wave.ints
-    rank = fresh or not scene.apart
+    rank = not scene.apart or (fresh and not _begin_outside(scene, wave, n))
     for i in range(min(n, SIZE)):
         floats[T + i], ints[HIT + i] = INF, sided(NOTHING, False)
         ints[FACE + i] = 0  # unless a hit tells another
@@ -173,7 +173,26 @@ def nearest_hits(scene: Arrays, wave: Wave, n: int, fresh: bool, scratch: Scratc
         else:
             _one_by_one(scene, wave, n, k, ranks, scratch)
     _settle(scene, wave, n, rank)
-    _pass_hidden(scene, wave, n, scratch.stack)
+    if not scene.apart:
+        _pass_hidden(scene, wave, n, scratch.stack)
+
+
+@called
+def _begin_outside(scene: Arrays, wave: Wave, n: int) -> bool:
+    """Whether fresh rays are known to begin outside of all solids; if so, they know it then too."""
+    floats, nearest = wave.floats, INF
+    for k in range(scene.solids):
+        center, radius_squared = vec_at(scene.balls, k, 0), scene.balls[k, 3]
+        for i in range(min(n, SIZE)):
+            from_center = sub(vec_of(floats, ORIGIN, i), center)
+            floats[T + i] = dot(from_center, from_center) - radius_squared
+        for i in range(min(n, SIZE)):
+            nearest = min(nearest, floats[T + i])
+    if nearest <= 0.0:
+        return False
+    for i in range(min(n, SIZE)):
+        wave.ints[MEDIUM + i] = AMBIENT
+    return True
 
 
 @called
