@@ -112,6 +112,20 @@ def lengths(vectors: Float) -> Float:
     return np.asarray(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)))
 
 
+def cross(a: Float, b: Float) -> Float:
+    """(m, 3) products of `a` and `b`, (m, 3). As np.cross, bit for bit, in a fraction of its time.
+
+    That one moves axes about to serve arrays of any shape, which costs more than the product.
+    """
+    ax, ay, az = a[:, 0], a[:, 1], a[:, 2]
+    bx, by, bz = b[:, 0], b[:, 1], b[:, 2]
+    product = np.empty(a.shape)
+    product[:, 0] = ay * bz - az * by
+    product[:, 1] = az * bx - ax * bz
+    product[:, 2] = ax * by - ay * bx
+    return product
+
+
 def refract(
     direction: Float, n: Float, ior_i: Float, ior_t: Float
 ) -> tuple[Float, NDArray[np.bool_]]:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float, lengths
+from harness.expected import Float, cross, lengths
 from harness.measure.precision import Precision
 from harness.renderers.base import Rays, Status
 from harness.scene.containment import bounds
@@ -219,12 +219,12 @@ def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) 
     for cause, form, shifted, step in trials:
         other = form.follow(shifted, path)
         grazing |= _fate_differs(paths, other)
+        others = [form.land(other, plane) for plane in planes]
         worst = none
-        for mine, plane in zip(landings, planes, strict=True):
-            theirs = form.land(other, plane)
+        for mine, theirs in zip(landings, others, strict=True):
             grazing |= mine.status != theirs.status
             worst = np.fmax(worst, _rate(mine.point, theirs.point, step))
-        other_level = other.weight[:, None] * form.land(other, planes[0]).transmission
+        other_level = other.weight[:, None] * others[0].transmission
         changes = (
             worst,
             _rate(paths.direction, other.direction, step),
@@ -294,9 +294,9 @@ def _shifted(rays: Rays, step: float) -> list[tuple[str, Rays, float]]:
     """
     d = rays.directions
     helper = np.where((np.abs(d[:, :1]) < 0.6), [[1.0, 0, 0]], [[0, 1.0, 0]])
-    e1 = np.cross(d, helper)
+    e1 = cross(d, helper)
     e1 /= lengths(e1)[:, None]
-    e2 = np.cross(d, e1)
+    e2 = cross(d, e1)
     out = []
     for e in (e1, e2):
         out.append(("origin", Rays(rays.origins + step * e, d), step))
