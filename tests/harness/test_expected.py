@@ -311,3 +311,8 @@ def test_prism_deviation_is_least_where_the_ray_passes_symmetrically(
     steep = 1 / math.sqrt(1 - (ior * math.sin(apex / 2)) ** 2)
     assert np.nanmin(found) >= least - 16 * EPS * steep
     assert abs(found[20] - least) <= 16 * EPS * steep
+
+
+def test_cross_is_numpys_product_bit_for_bit() -> None:
+    a, b = np.random.default_rng(12).normal(size=(2, 500, 3)) * [1e-9, 1, 1e9]
+    assert np.array_equal(expected.cross(a, b), np.cross(a, b))
