@@ -89,8 +89,7 @@ MUTANTS = (
     Mutant(
         "total internal reflection is clamped away",
         "optics.py",
-        ("    if q < 0.0:\n        return False, 0.0\n    return True, math.sqrt(q)",
-         "    return True, math.sqrt(max(0.0, q))"),
+        ("    return q >= 0.0, math.sqrt(max(q, 0.0))", "    return True, math.sqrt(max(q, 0.0))"),
         frozenset({"tir-critical"}),
         green=frozenset({"snell-sweep", "fresnel-outside", "thin-face-offset"}) | SLABS,
     ),
