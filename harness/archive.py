@@ -341,7 +341,8 @@ def _ways(
             if problem := unusable(told, len(plan.way_pixels(scene.film))):
                 silent[contender.name] = problem
             else:
-                found.append(PictureWays(contender.name, scene, plan.way_step(scene.film), told))
+                step, nm = plan.way_step(scene.film), plan.wavelength_of_ways(case)
+                found.append(PictureWays(contender.name, scene, step, told, nm))
         elif isinstance(told, RendererError):
             silent[contender.name] = str(told)
         else:

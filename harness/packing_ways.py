@@ -22,12 +22,16 @@ ALIKE = 1e-3  # of unit vectors: far above single precision; what only grazes ma
 
 @dataclass(frozen=True)
 class PictureWays:
-    """The main ways, with vertices and meetings, of the rays of every `step`-th pixel."""
+    """The main ways, with vertices and meetings, of the rays of every `step`-th pixel.
+
+    `nm` is the wavelength whose indices they have seen, None where all have the same.
+    """
 
     renderer: str
     scene: ResolvedScene
     step: int
     paths: RayPaths
+    nm: float | None = None
 
 
 def told(ways: Sequence[PictureWays], silent: Mapping[str, str]) -> dict[str, Any] | None:
@@ -56,6 +60,7 @@ def _of_renderer(ways: PictureWays) -> dict[str, Any]:
         "height": scene.film.height,
         "step": ways.step,
         "errorStep": ways.step,
+        "nm": ways.nm,
         "media": [{"name": medium.name, "ior": medium.ior} for medium in scene.media],
         "solids": [drawn_solid(solid) for solid in scene.solids],
         "planes": [drawn_plane(plane) for plane in _planes(scene)],

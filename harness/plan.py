@@ -227,10 +227,18 @@ def jobs_of(
 def scene_of_ways(case: PreparedCase, capabilities: Collection[Capability]) -> ResolvedScene:
     """In which the rays of a picture are followed: with a spectrum, in the middle of it."""
     scene = scene_for(case.scene, capabilities)
-    if not case.passes:
-        return scene
-    _, media = case.passes[len(case.passes) // 2]
-    return scene.model_copy(update={"media": media})
+    middle = _middle(case)
+    return scene if middle is None else scene.model_copy(update={"media": middle[1]})
+
+
+def wavelength_of_ways(case: PreparedCase) -> float | None:
+    """That of `scene_of_ways`, in nm; None where there is no spectrum."""
+    middle = _middle(case)
+    return None if middle is None else middle[0]
+
+
+def _middle(case: PreparedCase) -> tuple[float, tuple[Medium, ...]] | None:
+    return case.passes[len(case.passes) // 2] if case.passes else None
 
 
 def way_step(film: Film) -> int:

@@ -106,12 +106,12 @@ def unfitted(renderer: str, checks: Sequence[Check]) -> Diagnosis | None:
 # Of the cases in which a renderer is right, as many are asked what they say against a cause.
 MOST_WITNESSES = 24
 WITNESS_RAYS = 48
-# Checks that look at each ray of their probe, and so speak for all of them. Others look at where
-# light ends, at an extremum, at rays of one height, or at an angle whatever side it is on.
+# Checks that compare all there is to see of each ray of their probe, and so speak for all of them.
+# Others look at where light ends, at an extremum, at rays of one row or height, at one component,
+# or at an angle whatever side it is on.
 EVERY_RAY = frozenset({
-    Observable.EXIT_POINT, Observable.EXIT_DIRECTION, Observable.INTERNAL_ANGLE,
-    Observable.SLAB_OFFSET, Observable.STACK_OFFSET, Observable.DEVIATION,
-    Observable.FOLDED_DIRECTION, Observable.REFLECTANCE, Observable.TRANSMITTANCE,
+    Observable.EXIT_POINT, Observable.EXIT_DIRECTION, Observable.FOLDED_DIRECTION,
+    Observable.REFLECTANCE, Observable.TRANSMITTANCE,
 })  # fmt: skip
 # A renderer that passed deviates by less than its tolerances: as a rule by less than these, and
 # by less than the errors of single precision, which grow near a critical angle.

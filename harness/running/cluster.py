@@ -33,12 +33,13 @@ class Cluster:
 
     def renderer(self, name: str, origin: Origin) -> RemoteRenderer:
         """The renderer `name` as it is over there."""
+        from distributed.client import ClosedClientError
         from distributed.scheduler import KilledWorker
 
         executor: concurrent.futures.Executor = self.client.get_executor(pure=False)
         return RemoteRenderer(
             name, origin, executor, concurrency=UNDER_WAY * self.cores,
-            lost=(KilledWorker, concurrent.futures.CancelledError),
+            lost=(KilledWorker, concurrent.futures.CancelledError, ClosedClientError),
             gone=lambda: self.client.status not in ("running", "connecting"),
         )  # fmt: skip
 

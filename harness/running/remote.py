@@ -234,8 +234,7 @@ class RemoteRenderer:
             try:
                 return future.result(timeout=POLL_S)
             except concurrent.futures.TimeoutError:
-                if self._gone():
-                    future.cancel()
+                if self._gone():  # nobody is left to be told that it is not wanted any more
                     raise ConnectionLost(f"lost the machines that {self._name} ran on") from None
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from harness.data import scenes_root
 from harness.judging.documented import is_documented, known_here, known_in_run
-from harness.judging.explain import explain_run, unfitted
+from harness.judging.explain import _measuring, explain_run, unfitted
 from harness.plan import prepare
 from harness.record import Check, Diagnosis, SummaryCase, Verdict
 from harness.run import run
@@ -123,3 +123,19 @@ def test_no_documented_cause_can_vanish_unseen() -> None:
                 strict[cause] = strict.get(cause, False) or known.at_least > 0
     assert [cause for cause, held in strict.items() if not held] == []
     assert len(strict) >= 8
+
+
+@pytest.mark.parametrize(
+    ("name", "probes"),
+    [
+        ("slab-offset[thickness=0.25,ior=1.5]", ["through"]),
+        ("identity-matched[ior=1.333]", ["through", "light"]),
+        # An angle is the same on both sides of the normal, and this one is looked at alone.
+        ("brewster-angle[ior=1.333]", []),
+    ],
+)
+def test_a_case_speaks_against_a_cause_by_probes_of_which_every_ray_is_checked(
+    name: str, probes: list[str]
+) -> None:
+    (case,) = find([name], scenes_root())
+    assert [probe.name for probe in _measuring(prepare(case))] == probes

@@ -15,12 +15,15 @@ from hypothesis.extra.numpy import arrays
 
 from harness import imagefile
 from harness import record as records
+from harness.data import scenes_root
 from harness.packing_solids import drawn_solid
 from harness.packing_ways import MIRRORED, TOTAL, TRANSMITTED, happened, onward, unusable
+from harness.plan import prepare, scene_of_ways, wavelength_of_ways
 from harness.record import Verdict
 from harness.renderers.base import Capability, RayPaths, Status
 from harness.renderers.registry import create
 from harness.report import pack
+from harness.scene.load import find
 from harness.scene.resolved import Frame, Lens, Solid
 from tests.fakes.student import CAPABILITIES, student
 from tests.harness.tiny import passes_at, run_tiny
@@ -141,6 +144,15 @@ def test_the_rays_of_a_picture_are_refracted_as_by_a_ball(
         assert (np.abs(seen[meets] - expected) < expected * bits + rounding).all()
         assert np.isnan(seen[~meets]).all()
     assert (events[:, meets] == TRANSMITTED).all()
+
+
+def test_with_a_spectrum_rays_are_followed_at_the_wavelength_that_is_told() -> None:
+    case = prepare(find(["dispersion-ball-fringes"], scenes_root())[0])
+    nm = wavelength_of_ways(case)
+    assert nm in case.wavelengths
+    assert scene_of_ways(case, CAPABILITIES).media == dict(case.passes)[nm]
+    plain = prepare(find(["ball-checkerboard"], scenes_root())[0])
+    assert wavelength_of_ways(plain) is None
 
 
 def way(direction: tuple[float, float, float], meeting: tuple[float, float, float]) -> RayPaths:

@@ -188,6 +188,27 @@ def test_when_all_machines_are_gone_the_run_ends_with_one_message(
     assert not (tmp_path / "summary.json").exists()
 
 
+class Closed(Executor):
+    """As Dask's, whose futures tell a client of being cancelled that is there no more."""
+
+    def submit(self, fn: Callable[..., bytes], /, *args: bytes) -> Future[bytes]:  # type: ignore[override]
+        def told(done: Future[bytes]) -> None:
+            raise RuntimeError("IOLoop is closed")
+
+        future: Future[bytes] = Future()
+        future.add_done_callback(told)
+        return future
+
+
+def test_nothing_is_logged_of_jobs_that_are_given_up(
+    there: dict[str, Renderer], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(remote, "POLL_S", 0.01)
+    with pytest.raises(ConnectionLost):
+        far("mine", Closed(), gone=lambda: True).version()
+    assert caplog.records == []
+
+
 def test_a_time_out_of_the_future_itself_is_not_waited_for(there: dict[str, Renderer]) -> None:
     class Late(Executor):
         def submit(self, fn: Callable[..., bytes], /, *args: bytes) -> Future[bytes]:  # type: ignore[override]

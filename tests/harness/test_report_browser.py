@@ -47,6 +47,22 @@ def run_of_mixed_cases(root: Path) -> Path:
     return root
 
 
+def run_of_renderers(root: Path, names: list[str]) -> Path:
+    """One case, with as long a figure as there is."""
+    draft = Draft("slab-offset", "A slab only shifts the ray", "slab")
+    for name in names:
+        draft.checks.append(
+            check("exit_point", name, 7.968e-11, 0.0, 3.5e-10, "units", status=Verdict.PASS)
+        )
+        draft.runs.append(run_of(name, Verdict.PASS))
+    cases = [draft.finished()]
+    summary = summary_of(cases)
+    one = next(iter(summary.renderers.values()))
+    summary = summary.model_copy(update={"renderers": dict.fromkeys(names, one)})
+    write_report(write_run(root, cases, summary))
+    return root
+
+
 def shown(page: Page) -> list[str]:
     """The names of the cases that are to be seen."""
     return page.locator(".row:not([hidden]) .name").all_text_contents()
@@ -171,3 +187,18 @@ def test_without_script_everything_is_there(browser: Browser, run: Path) -> None
     page.locator(".case .name a").first.click()
     assert page.locator("h1").inner_text() == "Snell's law with the lecture's ratio"
     context.close()
+
+
+def test_on_paper_no_figure_stands_in_the_next_column(page: Page, tmp_path: Path) -> None:
+    """With six renderers a column is as narrow as it gets."""
+    run = run_of_renderers(tmp_path, ["a", "b", "c", "d", "e", "f"])
+    page.set_viewport_size({"width": 700, "height": 1000})  # A4 without its margins
+    page.goto((run / "index.html").as_uri())
+    page.emulate_media(media="print")
+    assert page.locator(".row .cell").count() == 6
+    assert page.evaluate(
+        """() => [...document.querySelectorAll('.row .cell')].every((cell) =>
+        [...cell.querySelectorAll('.num')].every((figure) => figure.scrollWidth <=
+          cell.clientWidth && figure.getBoundingClientRect().right <=
+          cell.getBoundingClientRect().right + 1))"""
+    )

@@ -149,3 +149,33 @@ def test_while_pixels_load_the_page_says_so(page: Page, run: Path) -> None:
     expect(page.locator(".viewer-state")).to_have_text("Loading pixels …")
     assert page.locator("#pictures img").first.is_visible()
     assert not panes(page)
+
+
+# --- layout ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("width", range(1200, 1300, 20))
+def test_pictures_stay_where_they_are_when_maps_take_their_place(
+    width: int, page: Page, run: Path
+) -> None:
+    """The line of controls needs a second one below some of these widths."""
+    page.set_viewport_size({"width": width, "height": 900})
+    open_case(page, run, "ball", "#mode=a")
+    top = "() => document.querySelector('.pane canvas').getBoundingClientRect().top + scrollY"
+    before = page.evaluate(top)
+    page.keyboard.press("d")
+    wait_for_hash(page, "mode=diff")
+    assert page.evaluate(top) == before
+
+
+def test_on_a_telephone_checks_have_their_figures_in_sight(page: Page, run: Path) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    open_case(page, run, "slab")
+    assert page.evaluate(
+        """() => { const place = document.querySelector('#checks .scroll');
+        return place.scrollWidth <= place.clientWidth; }"""
+    )
+    for figure in page.locator("#checks td.num").all():
+        box = figure.bounding_box()
+        assert box is not None
+        assert 0 <= box["x"] < box["x"] + box["width"] <= 390

@@ -57,7 +57,8 @@ export class Controls {
       h("div", { class: "segments", role: "group", "aria-label": "Mode" }, ...this.modes.values()),
       h("label", {}, "A ", this.pickers.get("a")), h("label", {}, "B ", this.pickers.get("b")),
       h("label", { class: "exposure" }, "EV ", this.exposure, this.reading),
-      this.encoding, this.everyLabel, // one of them, so that pictures stay where they are
+      // Either in a place of one width, so that the line breaks alike and pictures stay put.
+      h("span", { class: "either" }, this.encoding, this.everyLabel),
       h("button", { type: "button", class: "small-button", title: "Fit (f)", click: actions.fit }, "Fit"),
       h("button", { type: "button", class: "small-button", title: "Reset exposure (r)", click: actions.reset }, "Reset"));
   }

@@ -49,6 +49,7 @@ export interface StoredProbe {
 
 /** The ways of a picture's rays: like a probe's, but each ray has a path of its own. */
 export interface StoredWays extends StoredProbe {
+  readonly nm: number | null; // the wavelength whose indices they have seen, where that matters
   readonly events: StoredArray; // 0 transmitted, 1 totally reflected, 2 reflected by a mirror
 }
 

@@ -86,7 +86,9 @@ export class RayPanel {
 
 function mainWay(rays: Rays, ray: Ray): string {
   const share = `${number(100 * ray.weight, 3)} % of the light`;
-  return `The main way, as ${rays.teller} followed it: through what transmits, back from what does not. ` +
+  const nm = "nm" in rays.probe && rays.probe.nm;
+  const light = nm ? `, at ${number(nm, 5)} nm` : "";
+  return `The main way${light}, as ${rays.teller} followed it: through what transmits, back from what does not. ` +
     `By Fresnel ${share} takes it; what is reflected on the way is not drawn.`;
 }
 

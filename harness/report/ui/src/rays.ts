@@ -30,7 +30,7 @@ export interface Ray {
 
 export class Rays {
   private constructor(
-    readonly probe: StoredProbe,
+    readonly probe: StoredProbe | StoredWays,
     readonly solids: readonly Solid[],
     readonly errors: ReadonlyMap<string, Float32Array>,
     private readonly arrays: Readonly<Record<string, Float32Array>>,
