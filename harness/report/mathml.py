@@ -1,9 +1,12 @@
 """Formulas as people type them, typeset: ``d = t sin(theta) / sqrt(n^2 - 1)`` to MathML.
 
 The notation is that of the scenes' `formula` key: + - * / ^ and juxtaposition with their usual
-meaning and precedence (a product is the numerator of the / that follows it), ``name_index`` for
-subscripts, Greek letters by name, functions with parentheses, comparisons, and ``;`` between
-formulas. What is written otherwise is not guessed at: `typeset` returns None.
+meaning and precedence (a product is the numerator of the / that follows it, a sum's sign stands
+before that), a point for the inner product, ``name_index`` for subscripts, Greek letters by name,
+functions with parentheses, ``sum_k`` and ``sum_(k <= n)``, comparisons, degrees as in 45°, and
+``;`` between formulas. A name with another in parentheses and no space between them, ``n(lambda)``,
+is a value of what depends on it and stays together; ``n (lambda)`` is a product. What is written
+otherwise is not guessed at: `typeset` returns None.
 """
 
 from __future__ import annotations
@@ -16,9 +19,9 @@ from itertools import pairwise
 from markupsafe import Markup
 
 TOKEN = re.compile(
-    r"\s*(?:(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)"
-    r"|(?P<name>[A-Za-z]+\d*(?:_[A-Za-z0-9]+)*'*)"
-    r"|(?P<op><=|>=|!=|->|\+-|[-+*/^()=<>~,|])"
+    r"\s*(?:(?P<number>\d+(?:\.\d+)?(?:[eE][+-]?\d+)?°?)"
+    r"|(?P<name>sum_(?=\()|[A-Za-z]+\d*(?:_[A-Za-z0-9]+)*'*)"
+    r"|(?P<op><=|>=|!=|->|\+-|[-+*/^()=<>~,|.])"
     r"|(?P<bad>\S))"
 )
 GREEK_NAMES = """
@@ -43,6 +46,7 @@ class Box:
     markup: Markup
     inner: Markup
     word: bool = False  # a name of several letters, or a function: needs space around it
+    summing: bool = False  # the sign of a sum, over all factors that follow
 
     @classmethod
     def of(cls, markup: Markup, *, word: bool = False) -> Box:
@@ -76,6 +80,8 @@ def _letter(name: str) -> Markup:
 
 def _name(text: str) -> Box:
     """theta_i, R_s, n1, delta_min: a letter or word with its subscripts and primes."""
+    if text.startswith("sum_"):
+        return _sum(_index(text.removeprefix("sum_")))
     bare = text.rstrip("'")
     primes = "′" * (len(text) - len(bare))
     head, *indices = bare.split("_")
@@ -99,15 +105,24 @@ def _index(part: str) -> Markup:
     return _element("mn", part) if part.isdigit() else _letter(part)
 
 
+def _sum(over: Markup) -> Box:
+    sign = Markup('<mo largeop="true" movablelimits="false">∑</mo>')
+    markup = _element("munder", sign, over)
+    return Box(markup, markup, word=True, summing=True)
+
+
 class _Parser:
     """Recursive descent over one formula."""
 
     def __init__(self, formula: str) -> None:
         self.tokens: list[tuple[str, str]] = []
+        self.glued: set[int] = set()  # those opening parentheses that have no space before them
         for match in TOKEN.finditer(formula.strip()):
             kind = str(match.lastgroup)
             if kind == "bad":
                 raise _Unreadable
+            if kind == "op" and match[0] == "(":
+                self.glued.add(len(self.tokens))
             self.tokens.append((kind, match[kind]))
         self.at = 0
         self.bars = 0  # how many |…| are open
@@ -158,10 +173,16 @@ class _Parser:
     def product(self) -> Markup:
         boxes = [self.power()]
         while True:
-            if self.take("/"):
+            if boxes[-1].summing:
+                boxes.append(self.power())
+            elif self.take("/"):
                 below = self.power()
-                above = boxes[0].inner if len(boxes) == 1 else _juxtapose(boxes)
-                boxes = [Box.of(_element("mfrac", above, below.inner))]
+                first = max((i + 1 for i, box in enumerate(boxes) if box.summing), default=0)
+                factors = boxes[first:]
+                above = factors[0].inner if len(factors) == 1 else _juxtapose(factors)
+                boxes[first:] = [Box.of(_element("mfrac", above, below.inner))]
+            elif self.take("."):
+                boxes += [Box.of(Markup("<mo>⋅</mo>")), self.power()]
             elif self.take("*") or self.starts_factor():
                 boxes.append(self.power())
             else:
@@ -178,10 +199,32 @@ class _Parser:
         self.at += 1
         if kind == "name" and self.peek()[1] == "(" and self.is_function(text):
             return self.function(text)
+        if text == "sum_":
+            self.need("(")
+            return _sum(self.parenthesised(self.relation, "(", ")").inner)
+        if kind == "name" and self.is_value():
+            return self.value(text)
         return self.raised(self.primary(kind, text))
 
     def is_function(self, text: str) -> bool:
         return text in FUNCTIONS or text in ("sqrt", "exp", "abs")
+
+    def is_value(self) -> bool:
+        """Whether what follows a name are the parentheses of n(lambda), or of e(e(theta))."""
+        at = self.at
+        while (
+            at in self.glued and self.tokens[at + 1 : at + 2] and self.tokens[at + 1][0] == "name"
+        ):
+            if self.tokens[at + 2 : at + 3] == [("op", ")")]:
+                return True
+            at += 2
+        return False
+
+    def value(self, name: str) -> Box:
+        self.need("(")
+        argument = self.parenthesised(lambda: self.power().markup, "(", ")")
+        apply = Markup("<mo>&#x2061;</mo>")
+        return self.raised(Box.of(_element("mrow", _name(name).markup, apply, argument.markup)))
 
     def raised(self, base: Box) -> Box:
         if exponent := self.exponent():
@@ -248,12 +291,13 @@ class _Parser:
 
 
 def _number(text: str) -> Markup:
-    mantissa, _, power = text.lower().partition("e")
+    degrees = "°" if text.endswith("°") else ""
+    mantissa, _, power = text.removesuffix("°").lower().partition("e")
     if not power:
-        return _element("mn", mantissa)
+        return _element("mn", mantissa + degrees)
     exponent = str(int(power)).replace("-", "−")
     ten = _element("msup", _element("mn", "10"), _element("mn", exponent))
-    return _element("mrow", _element("mn", mantissa), _element("mo", "×"), ten)
+    return _element("mrow", _element("mn", mantissa), _element("mo", "×"), ten, degrees)
 
 
 def _juxtapose(boxes: list[Box]) -> Markup:

@@ -28,6 +28,7 @@ from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Verdict
 from harness.renderers import registry
 from harness.renderers.base import Capability, Image, RayPaths, Status
+from harness.report.mathml import typeset
 from harness.scene import model
 from harness.scene.load import LoadedCase, load_cases, scene_files
 from harness.scene.resolve import expand_thin_slabs
@@ -146,7 +147,7 @@ def test_every_case_names_its_truth_and_its_sources(name: str) -> None:
     The record tells that renderer's version. A picture of colours has no other truth.
     """
     case = first_cases()[name].model
-    assert case.formula
+    assert typeset(case.formula) is not None
     assert all(source.strip() for source in case.sources)
     assert case.checks
     for check in case.checks:

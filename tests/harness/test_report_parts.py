@@ -124,6 +124,8 @@ def letters(formula: str) -> str:
         ("delta = theta_1 + theta_2' - A", "δ=θ1+θ2′−A"),
         ("theta_c = asin(n_t / n_i), theta_i > theta_c", "θc=arcsin(ntni),θi>θc"),
         ("R = |r_s|^2; x <= 2e-6", "R=|rs|2x≤2×10−6"),
+        ("D - 2 (D . N) N; sin(45°)", "D−2(D⋅N)Nsin45°"),
+        ("sum_(j<=k) x^j = sum_j x_j", "∑j≤kxj=∑jxj"),
     ],
 )  # fmt: skip
 def test_formulas(formula: str, shown: str) -> None:
@@ -136,12 +138,38 @@ def test_a_product_is_the_numerator_and_only_a_factor_the_denominator() -> None:
     assert ["".join(part.itertext()).replace("\u2062", "") for part in fraction] == ["ab", "c"]
 
 
+def test_the_sign_of_a_sum_stands_before_its_fraction() -> None:
+    markup = typeset("1 + sum_k B_k / C_k")
+    fraction = ET.fromstring(str(markup)).find(".//mfrac")
+    assert fraction is not None
+    assert "".join(fraction[0].itertext()) == "Bk"
+    assert typeset("sum_k") is None
+    assert typeset("sum_k / 2") is None
+
+
+@pytest.mark.parametrize(
+    ("text", "below"),
+    [
+        ("x / n(lambda) b", "n(λ)"),
+        ("x / e(e(theta)) b", "e(e(θ))"),
+        ("x / n(lambda)^2 b", "n(λ)2"),
+        ("x / n (lambda) b", "n"),
+        ("x / n(a + b) b", "n"),
+        ("2 sum_k x_k / n b", "n"),
+    ],
+)
+def test_the_value_of_what_depends_on_a_name_stays_together(text: str, below: str) -> None:
+    fraction = ET.fromstring(str(typeset(text))).find(".//mfrac")
+    assert fraction is not None
+    assert "".join(fraction[1].itertext()).replace("\u2061", "") == below
+
+
 @pytest.mark.parametrize("text", ["", "a $ b", "((((", "sin(", "a ^", "<b>", "1 +", ")", "|a", "€"])
 def test_what_is_no_formula_is_left_alone(text: str) -> None:
     assert typeset(text) is None
 
 
-@given(st.text(alphabet="abn_θ ()^/*+-=<>&\"'|,;1.e\n", max_size=40) | st.text(max_size=600))
+@given(st.text(alphabet="abn_θ ()^/*+-=<>&\"'|,;1.e°sum\n", max_size=40) | st.text(max_size=600))
 def test_any_text_gives_well_formed_markup_or_none(text: str) -> None:
     markup = typeset(text)
     if markup is not None:
