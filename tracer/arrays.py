@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections import Counter
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -11,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracer.apart import OpenShape, alone, apart
 from tracer.boxes import LINK, NODE
 from tracer.errors import SceneError
 from tracer.faces import face_row
@@ -47,8 +46,9 @@ POINT, DIRECTIONAL = 0.0, 1.0
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
 # MEDIUM and EXTERIOR are what a thin slab is made of and what is around it. In a solid, the k-th of
-# them, the medium is k + 1, so that it also says in which solid a ray is.
-SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS = range(8)
+# them, the medium is k + 1, so that it also says in which solid a ray is. It is ALONE if nothing
+# comes near it.
+SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS, ALONE = range(9)
 AMBIENT = 0  # the medium around all solids
 
 
@@ -58,7 +58,7 @@ class Arrays(NamedTuple):
     Solids are in the order of their rank: where several overlap, the first is there.
     """
 
-    objects: NDArray[np.int64]  # (n, 8)
+    objects: NDArray[np.int64]  # (n, 9)
     balls: Floats  # (n, 4): centre and squared radius of a sphere around it
     materials: Floats  # (n, 9): two colours, thickness, highlight and its exponent
     rows: Floats  # shapes
@@ -85,6 +85,7 @@ class _Flattener:
         self.patterns: list[list[float]] = []
         self.texels: list[Floats] = [np.empty((0, 3))]
         self.trees: list[Tree] = []
+        self.faces: dict[int, OpenShape] = {}  # by object
         self.nodes = self.triangles = self.normals = self.texel_count = 0
         self.surface_count = 0
         self.medium_count = 1  # in the order of `media_of`
@@ -176,6 +177,7 @@ class _Flattener:
                 for row, decisions in zip(rows, compound_rows(where)[1], strict=True):
                     row += [0.0] * (HOLLOW - len(row)) + decisions
             case Rectangle() | Disk() | Plane():
+                self.faces[len(self.objects)] = shape
                 kind, rows = DISK if isinstance(shape, Disk) else RECTANGLE, [face_row(shape)]
             case Mesh():
                 kind, first, count = MESH, self.nodes, self.triangles
@@ -264,14 +266,6 @@ def _ball_around(points: Floats) -> list[float]:
     return _ball(center.tolist(), float(((points - center) ** 2).sum(axis=1).max()))
 
 
-def _apart(balls: list[list[float]]) -> bool:
-    """Whether the spheres around solids are well apart from each other."""
-    return all(
-        math.dist(a[:3], b[:3]) > (math.sqrt(a[3]) + math.sqrt(b[3])) * (1.0 + 1e-6)
-        for a, b in itertools.combinations(balls, 2)
-    )
-
-
 def _table(rows: list[list[float]], columns: int) -> Floats:
     table = np.zeros((len(rows), columns))
     for k, row in enumerate(rows):
@@ -308,14 +302,17 @@ def _flatten(scene: Scene) -> Arrays:
     nodes = np.concatenate(
         [tree.nodes for tree in trees], out=lined_up(sum(len(tree.nodes) for tree in trees))
     )
+    solids, faces = len(scene.solids), into.faces
+    lonely = [*alone(into.balls, solids, faces), *(False for _ in scene.surfaces)]
+    objects = [[*row, yes] for row, yes in zip(into.objects, lonely, strict=True)]
     return Arrays(
-        objects=np.array(into.objects, np.int64).reshape(-1, 8),
+        objects=np.array(objects, np.int64).reshape(-1, 9),
         balls=_table(into.balls, 4),
         materials=_table(into.materials, 9),
         rows=_table(into.rows, COLUMNS),
         media=media_table(media, scene.wavelength),
-        solids=len(scene.solids),
-        apart=_apart(into.balls[: len(scene.solids)]),
+        solids=solids,
+        apart=apart(into.balls, solids),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([_light(light) for light in scene.lights], 7),

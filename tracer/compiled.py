@@ -40,14 +40,15 @@ def compiled(function: Function) -> Function:
     With the environment variable ``NUMBA_DISABLE_JIT=1`` it stays a Python function, for
     debuggers and coverage.
     """
-    return _compiled(function, forceinline=True)
+    return _compiled(function, keep=True, forceinline=True)
 
 
 def inlined(function: Function) -> Function:
     """As `compiled`, for parts of compiled functions; Python cannot call it.
 
-    That saves the code that unpacks Python's arguments. It is merged into its callers, because
-    a scene's arrays are a hundred arguments, too many to pass for every ray.
+    That saves the code that unpacks Python's arguments, and a twentieth of all compilation as it
+    is not kept on disk by itself. It is merged into its callers, because a scene's arrays are a
+    hundred arguments, too many to pass for every ray.
     """
     return _compiled(function, forceinline=True, no_cpython_wrapper=True)
 
@@ -80,10 +81,10 @@ def _no_collections() -> Iterator[None]:
             gc.enable()
 
 
-def _compiled(function: Function, **options: Any) -> Function:
+def _compiled(function: Function, keep: bool = False, **options: Any) -> Function:
     options |= {"nogil": True, "_nrt": False, "no_cfunc_wrapper": True}  # C calls none of it
     try:
-        dispatcher = _numba.njit(error_model="numpy", cache=True, **options)(function)
+        dispatcher = _numba.njit(error_model="numpy", cache=keep, **options)(function)
     except RuntimeError:  # neither beside the package nor at home may anything be written
         dispatcher = _numba.njit(error_model="numpy", **options)(function)
     if hasattr(dispatcher, "py_func"):

@@ -11,9 +11,11 @@ import numpy as np
 from tracer.arrays import Arrays, Floats, flatten, media_of, media_table
 from tracer.camera import SIDE, camera_row, lens_point, pixel_centre, primary_ray
 from tracer.compiled import called, compiled
+from tracer.exposure import Exposure, Limits, Samples, exposure, wave_at
 from tracer.film import Sampling, developed, reach
 from tracer.hit import NOTHING, UNKNOWN
-from tracer.recursion import Exposure, Limits, Samples, exposure, go_on
+from tracer.inside import bounce
+from tracer.recursion import go_on
 from tracer.scene import Scene
 from tracer.surface import Lobes
 from tracer.threads import Work, for_bands
@@ -99,7 +101,11 @@ def _expose(
     while True:
         fresh = height == 0
         row = waiting.order[0 if fresh else height - 1]
-        wave = Wave(waiting.floats[row], waiting.ints[row])
+        if not fresh and waiting.inside[row]:
+            height, n = bounce(exposure, height - 1)
+            rays += n
+            continue
+        wave = wave_at(waiting, row)
         if fresh:
             height = 1
             waiting.filled[row], at = _primary_rays(

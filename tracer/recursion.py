@@ -8,29 +8,49 @@ without end would show.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
-
-from tracer.arrays import DIELECTRIC, EMISSIVE, MATERIAL, MEDIUM, NORMALS, Arrays, Floats
+from tracer.arrays import (
+    ALONE,
+    DIELECTRIC,
+    EMISSIVE,
+    MATERIAL,
+    MEDIUM,
+    NORMALS,
+    SHAPE,
+    SPHERE,
+    Arrays,
+    Floats,
+)
 from tracer.compiled import called, inlined, merged
-from tracer.hit import NOTHING, Hit, hit_point, new_stack
+from tracer.exposure import (
+    IOR_I,
+    IOR_T,
+    NORMAL,
+    OUT,
+    PASSED,
+    POINT,
+    REFLECTED,
+    TRANSMITTED,
+    Exposure,
+    R,
+    keep,
+    note_gap,
+    strength_of,
+    wave_at,
+    worth,
+)
+from tracer.hit import NOTHING, Hit, hit_point
+from tracer.inside import put_inside, refract_inside
 from tracer.light import absorbed, surroundings
 from tracer.shapes import INF
 from tracer.surface import Lobes, emitted, interface, scatter, upright
 from tracer.vector import Vec, along, mul, scale
 from tracer.wave import (
-    FLOATS,
     HIT,
     IN,
-    INTS,
     SIZE,
-    STRIDE,
     WEIGHT,
     Ints,
     Ray,
-    Scratch,
     Wave,
     hit_at,
     put_ray,
@@ -40,67 +60,6 @@ from tracer.wave import (
     vec_of,
 )
 
-TELLING = 1e-4  # a weight whose loss would show in a picture
-
-
-class Limits(NamedTuple):
-    max_depth: int
-    min_weight: float
-
-
-class Samples(NamedTuple):
-    """Samples of some rows of the film, one after the other.
-
-    `cut` is the weight that was not followed. `closest` is the shortest way between two surfaces
-    that light of at least `TELLING` took. `disperses` says that the wavelength matters.
-    """
-
-    radiance: Floats  # (n, 3)
-    cut: Floats  # (n,)
-    closest: Floats
-    disperses: NDArray[np.uint8]
-
-
-class Waiting(NamedTuple):
-    """Waves of rays that wait to be followed, the last first.
-
-    The k-th from the bottom is in row ``order[k]`` of the tables, with `filled` rays. A wave is
-    followed by two at most, of rays with a segment more: so no more wait than `max_depth`.
-    """
-
-    floats: Floats  # (waves, FLOATS)
-    ints: Ints  # (waves, INTS)
-    order: Ints  # (waves,)
-    filled: Ints  # (waves,)
-
-
-class Exposure(NamedTuple):
-    """What the waves of one thread have in common. A ray counts `share` in its sample."""
-
-    limits: Limits
-    lobes: Lobes
-    share: float
-    samples: Samples
-    waiting: Waiting
-    scratch: Scratch
-
-
-# Columns of Scratch.glass, for the rays that meet glass: those of vectors, and others.
-POINT, NORMAL, OUT, REFLECTED, TRANSMITTED = (3 * k * STRIDE for k in range(5))
-IOR_I, IOR_T, R, PASSED = (k * STRIDE for k in range(15, 19))
-GLASS = 19 * STRIDE
-
-
-def exposure(
-    scene: Arrays, limits: Limits, lobes: Lobes, share: float, samples: Samples
-) -> Exposure:
-    """With tables of its own for a thread."""
-    waves = limits.max_depth + 2
-    floats, ints = np.empty((waves, FLOATS)), np.empty((waves, INTS), np.int64)
-    waiting = Waiting(floats, ints, np.arange(waves), np.empty(waves, np.int64))
-    scratch = Scratch(np.empty(4 * SIZE, np.int64), np.empty(GLASS), new_stack(scene))
-    return Exposure(limits, lobes, share, samples, waiting, scratch)
-
 
 @merged
 def go_on(scene: Arrays, exposure: Exposure, height: int) -> int:
@@ -109,24 +68,20 @@ def go_on(scene: Arrays, exposure: Exposure, height: int) -> int:
     The wave is the one above a stack of `height`; how high that is then.
     """
     waiting = exposure.waiting
-    order, filled = waiting.order, waiting.filled
-    own, first, second = order[height], order[height + 1], order[height + 2]
-    wave, n = Wave(waiting.floats[own], waiting.ints[own]), filled[own]
+    rows = waiting.order[height:]
+    own, first, second, entered = rows[0], rows[1], rows[2], rows[3]
+    wave, n = wave_at(waiting, own), waiting.filled[own]
     nothing, lamps, glass, rest = _sort_out(scene, wave, n, exposure.scratch.queues)
     _absorb(scene, wave, n)
     _see(scene, exposure, wave, nothing, lamps)
     _reach_glass(scene, exposure, wave, glass)
     _refract(exposure.lobes, exposure.scratch.glass, glass)
-    count = _split(exposure, wave, glass, first, second)
+    count, inside = _split(scene, exposure, wave, glass, first, second, entered)
     count = _scatter(scene, exposure, wave, rest, first, second, count)
-    filled[first], filled[second] = min(count, SIZE), count - SIZE
-    waves = (count + SIZE - 1) // SIZE
-    order[height], order[height + 1], order[height + 2] = first, second, own
-    if waves < 2:
-        order[height + waves], order[height + 2] = own, second
-    if waves == 0:
-        order[height + 1] = first
-    return height + waves
+    refract_inside(exposure.lobes, wave_at(waiting, entered), inside)
+    up = keep(waiting, height, height + 3, inside, True)
+    up = keep(waiting, up, height + 1, min(count, SIZE), False)
+    return keep(waiting, up, height + 2, count - SIZE, False)
 
 
 @called
@@ -177,11 +132,6 @@ def _see(scene: Arrays, exposure: Exposure, wave: Wave, nothing: int, lamps: int
 
 
 @inlined
-def _strength(weight: Vec) -> float:
-    return max(weight[0], weight[1], weight[2])
-
-
-@inlined
 def _add(exposure: Exposure, pixel: int, radiance: Vec) -> None:
     for c in range(3):
         exposure.samples.radiance[pixel, c] += exposure.share * radiance[c]
@@ -189,10 +139,8 @@ def _add(exposure: Exposure, pixel: int, radiance: Vec) -> None:
 
 @inlined
 def _note_gap(exposure: Exposure, ray: Ray, t: float) -> None:
-    """Of the way `t` to what a ray meets."""
-    closest, pixel = exposure.samples.closest, ray.pixel
-    tells = (ray.segments > 1) & (_strength(ray.weight) >= TELLING)
-    closest[pixel] = min(closest[pixel], t if tells else INF)
+    """Of the way `t` to what a ray meets; that from the camera is none between two surfaces."""
+    note_gap(exposure.samples, ray.pixel, t if ray.segments > 1 else INF, strength_of(ray.weight))
 
 
 @inlined
@@ -239,9 +187,13 @@ def _refract(lobes: Lobes, glass: Floats, count: int) -> None:
 
 
 @called
-def _split(exposure: Exposure, wave: Wave, count: int, first: int, second: int) -> int:
-    """Lays two rays aside for each that meets glass, where they are worth it; how many."""
-    scratch, glass, at = exposure.scratch, exposure.scratch.glass, 0
+def _split(
+    scene: Arrays, exposure: Exposure, wave: Wave, count: int, first: int, second: int, entered: int
+) -> tuple[int, int]:
+    """Lays two rays aside for each that meets glass, where they are worth it; how many, and how
+    many of those that enter a ball by itself, which are for the wave in row `entered`.
+    """
+    scratch, glass, at, inside = exposure.scratch, exposure.scratch.glass, 0, 0
     for q in range(min(count, SIZE)):
         i = scratch.queues[2 * SIZE + q] & IN
         ray, hit, p = ray_at(wave, i), hit_at(wave, i), vec_of(glass, POINT, q)
@@ -249,8 +201,21 @@ def _split(exposure: Exposure, wave: Wave, count: int, first: int, second: int) 
         wr, reflected = vec_of(glass, REFLECTED, q), scale(glass[R + q], ray.weight)
         at = _lay_aside(exposure, first, second, at, _onward(ray, hit, p, wr, reflected, 1, False))
         wt, passed = vec_of(glass, TRANSMITTED, q), scale(glass[PASSED + q], ray.weight)
-        at = _lay_aside(exposure, first, second, at, _onward(ray, hit, p, wt, passed, 1, True))
-    return at
+        through = _onward(ray, hit, p, wt, passed, 1, True)
+        if (
+            hit.entering
+            and scene.objects[hit.object, SHAPE] == SPHERE
+            and scene.objects[hit.object, ALONE]
+        ):
+            if _is_worth(exposure, through):
+                n = vec_of(glass, NORMAL, q)
+                put_inside(
+                    scene, exposure, wave_at(exposure.waiting, entered), inside & IN, n, through
+                )
+                inside += 1
+        else:
+            at = _lay_aside(exposure, first, second, at, through)
+    return at, inside
 
 
 @inlined
@@ -267,12 +232,18 @@ def _lay_aside(exposure: Exposure, first: int, second: int, at: int, ray: Ray) -
 
     No branch here depends on a ray: one that is not worth it is cut, the next takes its place.
     """
-    waiting, limits = exposure.waiting, exposure.limits
-    row, strength = first if at < SIZE else second, _strength(ray.weight)
-    put_ray(Wave(waiting.floats[row], waiting.ints[row]), at & IN, ray)
-    worth = (strength > 0.0) & (strength >= limits.min_weight) & (ray.segments <= limits.max_depth)
-    exposure.samples.cut[ray.pixel] += 0.0 if worth else exposure.share * strength
-    return at + worth
+    row = first if at < SIZE else second
+    put_ray(wave_at(exposure.waiting, row), at & IN, ray)
+    return at + _is_worth(exposure, ray)
+
+
+@inlined
+def _is_worth(exposure: Exposure, ray: Ray) -> bool:
+    """Whether a ray is to be followed; it is cut if not."""
+    strength = strength_of(ray.weight)
+    followed = worth(exposure.limits, strength, ray.segments)
+    exposure.samples.cut[ray.pixel] += 0.0 if followed else exposure.share * strength
+    return followed
 
 
 # --- other surfaces -------------------------------------------------------------------------------

@@ -41,7 +41,7 @@ IN = SIZE - 1  # ``i & IN`` is i, and tells the compiler that it is not negative
 # Where columns begin: of what a ray carries, and of what it meets. Those of vectors are three.
 ORIGIN, DIRECTION, WEIGHT = 0 * STRIDE, 3 * STRIDE, 6 * STRIDE
 T = 9 * STRIDE
-FLOATS = 10 * STRIDE
+FLOATS = 23 * STRIDE  # those behind T are used by `tracer.inside`
 PIXEL, SEGMENTS, MEDIUM, LEFT, LEFT_FACE = (k * STRIDE for k in range(5))
 HIT, FACE, BEFORE, BEYOND = (k * STRIDE for k in range(5, 9))
 INTS = 9 * STRIDE

@@ -11,8 +11,8 @@ import pytest
 from tests.tracer.scenes import CAMERA, wall
 from tests.tracer.test_properties import SHAPES, moved, rays_at
 from tracer.arrays import CELL, COMPOUND, MESH, SHAPE, Arrays, flatten
+from tracer.exposure import GLASS
 from tracer.hit import NOTHING, UNKNOWN, nearest_hit, new_stack
-from tracer.recursion import GLASS
 from tracer.scene import Medium, Mirror, Scene, Solid, Surface
 from tracer.shapes import Disk, Sphere
 from tracer.vector import Vec
