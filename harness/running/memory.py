@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import psutil
 
-PERIOD_S = 1.0  # a look that walks through pages takes some 10 ms
+PERIOD_S = 2.0  # a look that walks through pages takes 10 to 30 ms
 
 
 def memory_mb(seen: float = 0.0) -> float:
