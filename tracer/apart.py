@@ -5,18 +5,22 @@ Objects are taken for the spheres around them, rows of (center, squared radius);
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracer.shapes import Disk, Plane, Rectangle
+from tracer.shapes import INF, Disk, Plane, Rectangle, Sphere
+from tracer.solids import Cell
 
 Floats = NDArray[np.float64]
 OpenShape = Rectangle | Disk | Plane
+CROWD, BALL, FLAT = range(3)  # a ball or a cell between planes is alone, or none of these
 WELL = 1.0 + 1e-6  # times the sum of their radii, solids are well apart from each other
 TOUCHING = 1.0 - 1e-9  # times its radius, nothing is in a ball; a floor that it lies on is not
+FEW = 12  # planes of a cell whose corners are looked for
 
 
 def apart(balls: Sequence[Sequence[float]], solids: int) -> bool:
@@ -26,22 +30,28 @@ def apart(balls: Sequence[Sequence[float]], solids: int) -> bool:
 
 
 def alone(
-    balls: Sequence[Sequence[float]], solids: int, faces: Mapping[int, OpenShape]
-) -> list[bool]:
-    """Of each solid, whether other solids are well apart from it, and nothing else is within.
+    shapes: Sequence[object], balls: Sequence[Sequence[float]], faces: Mapping[int, OpenShape]
+) -> list[int]:
+    """Which solids are alone: others are well apart, and nothing else is within.
 
-    `faces` are the objects that have no sphere around them.
+    `shapes` are those of the solids, `faces` the objects that have no sphere around them.
     """
-    table = np.array(balls).reshape(-1, 4)
-    found = []
-    for k in range(solids):
+    table, solids, found = np.array(balls).reshape(-1, 4), len(shapes), []
+    for k, shape in enumerate(shapes):
+        corners = None
+        if isinstance(shape, Cell) and len(shape.bounds) <= FEW:
+            planes = [bound for bound in shape.bounds if isinstance(bound, Plane)]
+            corners = _corners(planes) if len(planes) == len(shape.bounds) else None
         away = _well_apart(table[:solids], table[k])
         away[k] = True
-        begin = _distances(table, table[k]) - np.sqrt(table[:, 3])
+        begin, radius = _distances(table, table[k]) - np.sqrt(table[:, 3]), math.sqrt(table[k, 3])
         for other, face in faces.items():
             begin[other] = _distance(face, table[k, :3])
-        free = begin[solids:] >= math.sqrt(table[k, 3]) * TOUCHING
-        found.append(bool(away.all() and free.all()))
+            if corners is not None and _passes_by(face, corners, radius):
+                begin[other] = INF
+        free = away.all() and (begin[solids:] >= radius * TOUCHING).all()
+        kind = BALL if isinstance(shape, Sphere) else CROWD if corners is None else FLAT
+        found.append(kind if free else CROWD)
     return found
 
 
@@ -62,3 +72,23 @@ def _distance(face: OpenShape, p: Floats) -> float:
         return math.hypot(max(0.0, math.hypot(x, y) - face.radius), z)
     width, height = face.size
     return math.hypot(max(0.0, abs(x) - width / 2.0), max(0.0, abs(y) - height / 2.0), z)
+
+
+def _corners(planes: Sequence[Plane]) -> Floats:
+    """(n, 3) where three of the planes meet, behind all others."""
+    normals, offsets = np.array([p.normal for p in planes]), np.array([p.offset for p in planes])
+    threes = np.array(list(itertools.combinations(range(len(planes)), 3))).reshape(-1, 3)
+    threes = threes[np.abs(np.linalg.det(normals[threes])) > 1e-12]
+    points = np.linalg.solve(normals[threes], offsets[threes][:, :, None])[:, :, 0]
+    behind = points @ normals.T <= offsets + 1e-9 * np.abs(points).max(initial=1.0)
+    return np.asarray(points[behind.all(axis=1)])
+
+
+def _passes_by(face: OpenShape, corners: Floats, radius: float) -> bool:
+    """Whether the plane of a face is well on one side of a solid."""
+    if isinstance(face, Plane):
+        heights = corners @ np.array(face.normal) - face.offset
+    else:
+        heights = (corners - face.origin) @ np.array(face.z)
+    least = (WELL - 1.0) * radius
+    return bool((heights > least).all() or (heights < -least).all())

@@ -46,8 +46,8 @@ POINT, DIRECTIONAL = 0.0, 1.0
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
 # MEDIUM and EXTERIOR are what a thin slab is made of and what is around it. In a solid, the k-th of
-# them, the medium is k + 1, so that it also says in which solid a ray is. It is ALONE if nothing
-# comes near it.
+# them, the medium is k + 1, so that it also says in which solid a ray is. ALONE
+# says whether nothing else comes near it (see `tracer.apart`).
 SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS, ALONE = range(9)
 AMBIENT = 0  # the medium around all solids
 
@@ -302,17 +302,18 @@ def _flatten(scene: Scene) -> Arrays:
     nodes = np.concatenate(
         [tree.nodes for tree in trees], out=lined_up(sum(len(tree.nodes) for tree in trees))
     )
-    solids, faces = len(scene.solids), into.faces
-    lonely = [*alone(into.balls, solids, faces), *(False for _ in scene.surfaces)]
-    objects = [[*row, yes] for row, yes in zip(into.objects, lonely, strict=True)]
+    objects = np.zeros((len(into.objects), 9), np.int64)
+    objects[:, :ALONE] = np.array(into.objects).reshape(-1, ALONE)
+    solids = [solid.shape for solid in ranked(scene.solids)]
+    objects[: len(solids), ALONE] = alone(solids, into.balls, into.faces)
     return Arrays(
-        objects=np.array(objects, np.int64).reshape(-1, 9),
+        objects=objects,
         balls=_table(into.balls, 4),
         materials=_table(into.materials, 9),
         rows=_table(into.rows, COLUMNS),
         media=media_table(media, scene.wavelength),
-        solids=solids,
-        apart=apart(into.balls, solids),
+        solids=len(solids),
+        apart=apart(into.balls, len(solids)),
         patterns=_table(into.patterns, 9),
         texels=np.ascontiguousarray(np.concatenate(into.texels), float),
         lights=_table([_light(light) for light in scene.lights], 7),

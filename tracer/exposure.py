@@ -45,16 +45,16 @@ class Waiting(NamedTuple):
     """Waves of rays that wait to be followed, the last first.
 
     The k-th from the bottom is in row ``order[k]`` of the tables, with `filled` rays; `inside` says
-    that they are in balls (see `tracer.inside`). A wave is followed by two at most and one of rays
-    inside, that one by one at a time, all of rays with a segment more: so no more than
-    ``2 max_depth`` wait.
+    what solids they are in that are alone (BALL, FLAT), or CROWD. A wave is followed by two at most
+    and one of each of these, which are followed by one at a time, all of rays with a segment more:
+    so no more than ``3 max_depth`` wait.
     """
 
     floats: Floats  # (waves, FLOATS)
     ints: Ints  # (waves, INTS)
     order: Ints  # (waves,)
     filled: Ints  # (waves,)
-    inside: NDArray[np.bool_]  # (waves,)
+    inside: Ints  # (waves,)
 
 
 class Exposure(NamedTuple):
@@ -72,9 +72,9 @@ def exposure(
     scene: Arrays, limits: Limits, lobes: Lobes, share: float, samples: Samples
 ) -> Exposure:
     """With tables of its own for a thread."""
-    waves = 2 * limits.max_depth + 4
+    waves = 3 * limits.max_depth + 5
     floats, ints = np.empty((waves, FLOATS)), np.empty((waves, INTS), np.int64)
-    filled, inside = np.empty(waves, np.int64), np.zeros(waves, np.bool_)
+    filled, inside = np.empty(waves, np.int64), np.empty(waves, np.int64)
     waiting = Waiting(floats, ints, np.arange(waves), filled, inside)
     scratch = Scratch(np.empty(4 * SIZE, np.int64), np.empty(GLASS), new_stack(scene))
     return Exposure(limits, lobes, share, samples, waiting, scratch)
@@ -86,7 +86,7 @@ def wave_at(waiting: Waiting, row: int) -> Wave:
 
 
 @inlined
-def keep(waiting: Waiting, height: int, at: int, n: int, inside: bool) -> int:
+def keep(waiting: Waiting, height: int, at: int, n: int, inside: int) -> int:
     """Puts the row at place `at` onto a stack of `height`, if any of its `n` rays are to be
     followed; how high the stack is then.
     """
@@ -110,6 +110,6 @@ def worth(limits: Limits, strength: float, segments: int) -> bool:
 
 
 @inlined
-def note_gap(samples: Samples, pixel: int, t: float, strength: float) -> None:
+def note_gap(closest: Floats, pixel: int, t: float, strength: float) -> None:
     """Of the way `t` between two surfaces."""
-    samples.closest[pixel] = min(samples.closest[pixel], t if strength >= TELLING else INF)
+    closest[pixel] = min(closest[pixel], t if strength >= TELLING else INF)

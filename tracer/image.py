@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracer.apart import CROWD
 from tracer.arrays import Arrays, Floats, flatten, media_of, media_table
 from tracer.camera import SIDE, camera_row, lens_point, pixel_centre, primary_ray
 from tracer.compiled import called, compiled
@@ -19,7 +20,7 @@ from tracer.recursion import go_on
 from tracer.scene import Scene
 from tracer.surface import Lobes
 from tracer.threads import Work, for_bands
-from tracer.wave import PIXEL, SIZE, STRIDE, Ray, Wave, nearest_hits, put_ray
+from tracer.wave import PIXEL, SIZE, STRIDE, Ray, Wave, nearest_hits, padded, put_ray
 
 BAND = 4  # rows of samples that a thread takes at a time
 CENTRES = Sampling()
@@ -81,7 +82,7 @@ def _primary_rays(
             pixel, k, i = pixel + 1, 0, i + 1
             if i == film.width:
                 i, j = 0, j + 1
-    for m in range(min(n, SIZE)):  # for LLVM to make several at once
+    for m in range(padded(n)):  # for LLVM to make several at once
         x, y, u, v = floats[m], floats[STRIDE + m], floats[2 * STRIDE + m], floats[3 * STRIDE + m]
         o, d = primary_ray(camera, x, y, u, v)
         put_ray(
@@ -101,8 +102,8 @@ def _expose(
     while True:
         fresh = height == 0
         row = waiting.order[0 if fresh else height - 1]
-        if not fresh and waiting.inside[row]:
-            height, n = bounce(exposure, height - 1)
+        if not fresh and waiting.inside[row] != CROWD:
+            height, n = bounce(scene, exposure, height - 1)
             rays += n
             continue
         wave = wave_at(waiting, row)

@@ -8,18 +8,10 @@ without end would show.
 
 from __future__ import annotations
 
-from tracer.arrays import (
-    ALONE,
-    DIELECTRIC,
-    EMISSIVE,
-    MATERIAL,
-    MEDIUM,
-    NORMALS,
-    SHAPE,
-    SPHERE,
-    Arrays,
-    Floats,
-)
+from typing import NamedTuple
+
+from tracer.apart import BALL, CROWD, FLAT
+from tracer.arrays import ALONE, DIELECTRIC, EMISSIVE, MATERIAL, MEDIUM, NORMALS, Arrays, Floats
 from tracer.compiled import called, inlined, merged
 from tracer.exposure import (
     IOR_I,
@@ -39,10 +31,10 @@ from tracer.exposure import (
     worth,
 )
 from tracer.hit import NOTHING, Hit, hit_point
-from tracer.inside import put_inside, refract_inside
+from tracer.inside import put_in_ball, put_in_cell, refract_in_balls
 from tracer.light import absorbed, surroundings
 from tracer.shapes import INF
-from tracer.surface import Lobes, emitted, interface, scatter, upright
+from tracer.surface import Lobes, emitted, refracted, scatter, upright
 from tracer.vector import Vec, along, mul, scale
 from tracer.wave import (
     HIT,
@@ -53,12 +45,30 @@ from tracer.wave import (
     Ray,
     Wave,
     hit_at,
+    padded,
     put_ray,
     put_vec,
     ray_at,
     side_of,
     vec_of,
 )
+
+
+class Rows(NamedTuple):
+    """Where rays are laid aside: those in balls, in flat cells, and all others."""
+
+    ball: int
+    flat: int
+    first: int
+    second: int
+
+
+class Aside(NamedTuple):
+    """How many are."""
+
+    ball: int
+    flat: int
+    crowd: int
 
 
 @merged
@@ -68,20 +78,21 @@ def go_on(scene: Arrays, exposure: Exposure, height: int) -> int:
     The wave is the one above a stack of `height`; how high that is then.
     """
     waiting = exposure.waiting
-    rows = waiting.order[height:]
-    own, first, second, entered = rows[0], rows[1], rows[2], rows[3]
+    places = waiting.order[height:]
+    own, rows = places[0], Rows(places[1], places[2], places[3], places[4])
     wave, n = wave_at(waiting, own), waiting.filled[own]
     nothing, lamps, glass, rest = _sort_out(scene, wave, n, exposure.scratch.queues)
     _absorb(scene, wave, n)
     _see(scene, exposure, wave, nothing, lamps)
     _reach_glass(scene, exposure, wave, glass)
     _refract(exposure.lobes, exposure.scratch.glass, glass)
-    count, inside = _split(scene, exposure, wave, glass, first, second, entered)
-    count = _scatter(scene, exposure, wave, rest, first, second, count)
-    refract_inside(exposure.lobes, wave_at(waiting, entered), inside)
-    up = keep(waiting, height, height + 3, inside, True)
-    up = keep(waiting, up, height + 1, min(count, SIZE), False)
-    return keep(waiting, up, height + 2, count - SIZE, False)
+    aside = _split(scene, exposure, wave, glass, rows)
+    crowd = _scatter(scene, exposure, wave, rest, rows, aside.crowd)
+    refract_in_balls(exposure.lobes, wave_at(waiting, rows.ball), aside.ball)
+    up = keep(waiting, height, height + 1, aside.ball, BALL)
+    up = keep(waiting, up, height + 2, aside.flat, FLAT)
+    up = keep(waiting, up, height + 3, min(crowd, SIZE), CROWD)
+    return keep(waiting, up, height + 4, crowd - SIZE, CROWD)
 
 
 @called
@@ -140,7 +151,8 @@ def _add(exposure: Exposure, pixel: int, radiance: Vec) -> None:
 @inlined
 def _note_gap(exposure: Exposure, ray: Ray, t: float) -> None:
     """Of the way `t` to what a ray meets; that from the camera is none between two surfaces."""
-    note_gap(exposure.samples, ray.pixel, t if ray.segments > 1 else INF, strength_of(ray.weight))
+    way = t if ray.segments > 1 else INF
+    note_gap(exposure.samples.closest, ray.pixel, way, strength_of(ray.weight))
 
 
 @inlined
@@ -174,48 +186,47 @@ def _reach_glass(scene: Arrays, exposure: Exposure, wave: Wave, count: int) -> N
 @called
 def _refract(lobes: Lobes, glass: Floats, count: int) -> None:
     """Snell and Fresnel: where to rays go on from glass, and with what part of their weight."""
-    for q in range(min(count, SIZE)):
+    for q in range(padded(count)):
         ior_i, ior_t = glass[IOR_I + q], glass[IOR_T + q]
         wi, n = vec_of(glass, OUT, q), vec_of(glass, NORMAL, q)
-        transmits, reflectance, wr, wt = interface(wi, n, ior_i, ior_t)
-        mu = ior_i / ior_t
-        passed = (1.0 - reflectance) * (mu * mu if lobes.radiance_n2 else 1.0)
-        glass[R + q] = reflectance if lobes.reflection or not transmits else 0.0
-        glass[PASSED + q] = passed if lobes.transmission and transmits else 0.0
+        glass[R + q], glass[PASSED + q], wr, wt = refracted(lobes, wi, n, ior_i, ior_t)
         put_vec(glass, REFLECTED, q, wr)
         put_vec(glass, TRANSMITTED, q, wt)
 
 
 @called
-def _split(
-    scene: Arrays, exposure: Exposure, wave: Wave, count: int, first: int, second: int, entered: int
-) -> tuple[int, int]:
-    """Lays two rays aside for each that meets glass, where they are worth it; how many, and how
-    many of those that enter a ball by itself, which are for the wave in row `entered`.
-    """
-    scratch, glass, at, inside = exposure.scratch, exposure.scratch.glass, 0, 0
+def _split(scene: Arrays, exposure: Exposure, wave: Wave, count: int, rows: Rows) -> Aside:
+    """Lays two rays aside for each that meets glass, where they are worth it."""
+    scratch, glass, aside = exposure.scratch, exposure.scratch.glass, Aside(0, 0, 0)
     for q in range(min(count, SIZE)):
         i = scratch.queues[2 * SIZE + q] & IN
         ray, hit, p = ray_at(wave, i), hit_at(wave, i), vec_of(glass, POINT, q)
         _note_gap(exposure, ray, hit.t)
         wr, reflected = vec_of(glass, REFLECTED, q), scale(glass[R + q], ray.weight)
-        at = _lay_aside(exposure, first, second, at, _onward(ray, hit, p, wr, reflected, 1, False))
+        back = _onward(ray, hit, p, wr, reflected, 1, False)
+        at = _lay_aside(exposure, rows, aside.crowd, back)
         wt, passed = vec_of(glass, TRANSMITTED, q), scale(glass[PASSED + q], ray.weight)
         through = _onward(ray, hit, p, wt, passed, 1, True)
-        if (
-            hit.entering
-            and scene.objects[hit.object, SHAPE] == SPHERE
-            and scene.objects[hit.object, ALONE]
-        ):
-            if _is_worth(exposure, through):
-                n = vec_of(glass, NORMAL, q)
-                put_inside(
-                    scene, exposure, wave_at(exposure.waiting, entered), inside & IN, n, through
-                )
-                inside += 1
-        else:
-            at = _lay_aside(exposure, first, second, at, through)
-    return at, inside
+        kind = scene.objects[hit.object, ALONE] if hit.entering else CROWD
+        if kind == CROWD:
+            at = _lay_aside(exposure, rows, at, through)
+        aside = Aside(aside.ball, aside.flat, at)
+        if kind != CROWD and _is_worth(exposure, through):
+            aside = _lay_inside(scene, exposure, rows, aside, vec_of(glass, NORMAL, q), through)
+    return aside
+
+
+@inlined
+def _lay_inside(
+    scene: Arrays, exposure: Exposure, rows: Rows, aside: Aside, n: Vec, ray: Ray
+) -> Aside:
+    """With a ray that has entered a solid which is alone."""
+    if scene.objects[ray.left, ALONE] == BALL:
+        wave = wave_at(exposure.waiting, rows.ball)
+        put_in_ball(scene, exposure, wave, aside.ball & IN, n, ray)
+        return Aside(aside.ball + 1, aside.flat, aside.crowd)
+    put_in_cell(scene, wave_at(exposure.waiting, rows.flat), aside.flat & IN, ray)
+    return Aside(aside.ball, aside.flat + 1, aside.crowd)
 
 
 @inlined
@@ -227,12 +238,12 @@ def _onward(ray: Ray, hit: Hit, p: Vec, d: Vec, weight: Vec, crossed: int, trans
 
 
 @inlined
-def _lay_aside(exposure: Exposure, first: int, second: int, at: int, ray: Ray) -> int:
-    """As the `at`-th of the two waves in rows `first` and `second`; how many there are then.
+def _lay_aside(exposure: Exposure, rows: Rows, at: int, ray: Ray) -> int:
+    """As the `at`-th of those that are in no solid by themselves; how many there are then.
 
     No branch here depends on a ray: one that is not worth it is cut, the next takes its place.
     """
-    row = first if at < SIZE else second
+    row = rows.first if at < SIZE else rows.second
     put_ray(wave_at(exposure.waiting, row), at & IN, ray)
     return at + _is_worth(exposure, ray)
 
@@ -250,9 +261,7 @@ def _is_worth(exposure: Exposure, ray: Ray) -> bool:
 
 
 @merged
-def _scatter(
-    scene: Arrays, exposure: Exposure, wave: Wave, count: int, first: int, second: int, at: int
-) -> int:
+def _scatter(scene: Arrays, exposure: Exposure, wave: Wave, count: int, rows: Rows, at: int) -> int:
     """As `_split`, behind `at` rays, for those that meet neither a lamp nor glass."""
     stack = exposure.scratch.stack
     for q in range(count):
@@ -267,7 +276,7 @@ def _scatter(
         _add(exposure, ray.pixel, mul(ray.weight, lobes.sent))
         reflected, passed = mul(ray.weight, lobes.reflected), mul(ray.weight, lobes.transmitted)
         back = _onward(ray, hit, lobes.p, lobes.wr, reflected, 1, False)
-        at = _lay_aside(exposure, first, second, at, back)
+        at = _lay_aside(exposure, rows, at, back)
         through = _onward(ray, hit, lobes.p_t, lobes.wt, passed, lobes.crossed, True)
-        at = _lay_aside(exposure, first, second, at, through)
+        at = _lay_aside(exposure, rows, at, through)
     return at

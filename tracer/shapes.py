@@ -155,10 +155,10 @@ def sphere_stretch(o: Vec, d: Vec, center: Vec, radius: float) -> tuple[float, f
 def plane_stretch(o: Vec, d: Vec, normal: Vec, offset: float) -> tuple[float, float]:
     approach = dot(normal, d)
     height = offset - dot(normal, o)
-    if approach == 0.0:
-        return (-INF, INF) if height >= 0.0 else (INF, -INF)
-    t = height / approach
-    return t if approach < 0.0 else -INF, t if approach > 0.0 else INF
+    t = height / approach  # whatever that is along the plane: no branch, for LLVM to take several
+    along_it = approach == 0.0
+    enter = INF if along_it & (height < 0.0) else -INF
+    return t if approach < 0.0 else enter, t if approach > 0.0 else -enter
 
 
 @merged

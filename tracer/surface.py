@@ -73,6 +73,22 @@ def interface(wi: Vec, n: Vec, ior_i: float, ior_t: float) -> tuple[bool, float,
     return transmits, R if transmits else 1.0, wr, chosen(transmits, wt, wr)
 
 
+@inlined
+def refracted(
+    lobes: Lobes, wi: Vec, n: Vec, ior_i: float, ior_t: float
+) -> tuple[float, float, Vec, Vec]:
+    """(what is reflected, what is transmitted, wr, wt) where two media meet."""
+    transmits, R, wr, wt = interface(wi, n, ior_i, ior_t)
+    mu = ior_i / ior_t
+    passed = (1.0 - R) * (mu * mu if lobes.radiance_n2 else 1.0)
+    return (
+        R if lobes.reflection or not transmits else 0.0,
+        passed if lobes.transmission and transmits else 0.0,
+        wr,
+        wt,
+    )
+
+
 @called
 def upright(wi: Vec, smooth: Vec, geometric: Vec, ior_i: float, ior_t: float) -> Vec:
     """The normal to refract at: a mesh's smooth one, but where that would send a ray to the wrong

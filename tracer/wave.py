@@ -35,7 +35,8 @@ from tracer.vector import Vec, dot, sub
 Ints = NDArray[np.int64]
 
 SIZE = 256  # rays of a wave: few enough for their columns to stay in a cache
-STRIDE = SIZE + 8  # from column to column, so that they do not all start in the same part of it
+STEP = 16  # rays that LLVM may treat at once, in one loop or another
+STRIDE = SIZE + 24  # from column to column, so that they do not all start in the same part of it
 IN = SIZE - 1  # ``i & IN`` is i, and tells the compiler that it is not negative
 
 # Where columns begin: of what a ray carries, and of what it meets. Those of vectors are three.
@@ -74,6 +75,14 @@ class Scratch(NamedTuple):
     queues: Ints  # (4 SIZE,)
     glass: Floats  # see `recursion`
     stack: Floats  # see `hit.new_stack`
+
+
+@inlined
+def padded(n: int) -> int:
+    """With some of the empty places behind `n` rays, which do no harm: whole steps, as what is left
+    over would be treated one by one.
+    """
+    return (min(n, SIZE) + STEP - 1) & -STEP
 
 
 @inlined
@@ -160,7 +169,7 @@ def nearest_hits(scene: Arrays, wave: Wave, n: int, fresh: bool, scratch: Scratc
     """
     floats, ints = wave.floats, wave.ints
     rank = not scene.apart or (fresh and not _begin_outside(scene, wave, n))
-    for i in range(min(n, SIZE)):
+    for i in range(padded(n)):
         floats[T + i], ints[HIT + i] = INF, sided(NOTHING, False)
         ints[FACE + i] = 0  # unless a hit tells another
         ints[BEFORE + i], ints[BEYOND + i] = AMBIENT, AMBIENT
@@ -183,14 +192,14 @@ def _begin_outside(scene: Arrays, wave: Wave, n: int) -> bool:
     floats, nearest = wave.floats, INF
     for k in range(scene.solids):
         center, radius_squared = vec_at(scene.balls, k, 0), scene.balls[k, 3]
-        for i in range(min(n, SIZE)):
+        for i in range(padded(n)):
             from_center = sub(vec_of(floats, ORIGIN, i), center)
             floats[T + i] = dot(from_center, from_center) - radius_squared
         for i in range(min(n, SIZE)):
             nearest = min(nearest, floats[T + i])
     if nearest <= 0.0:
         return False
-    for i in range(min(n, SIZE)):
+    for i in range(padded(n)):
         wave.ints[MEDIUM + i] = AMBIENT
     return True
 
@@ -200,7 +209,7 @@ def _spheres(scene: Arrays, wave: Wave, n: int, k: int) -> None:
     floats, ints = wave.floats, wave.ints
     row = scene.objects[k, FIRST]
     center, radius = vec_at(scene.rows, row, 0), scene.rows[row, 3]
-    for i in range(min(n, SIZE)):
+    for i in range(padded(n)):
         o, d = vec_of(floats, ORIGIN, i), vec_of(floats, DIRECTION, i)
         t, entering = sphere_hit(o, d, center, radius, ints[LEFT + i] == sided(k, True))
         t = INF if ints[LEFT + i] == sided(k, False) else t
@@ -211,7 +220,7 @@ def _spheres(scene: Arrays, wave: Wave, n: int, k: int) -> None:
 def _faces(scene: Arrays, wave: Wave, n: int, k: int, is_disk: bool) -> None:
     floats, ints = wave.floats, wave.ints
     face = open_face(scene.rows, scene.objects[k, FIRST])
-    for i in range(min(n, SIZE)):
+    for i in range(padded(n)):
         o, d = vec_of(floats, ORIGIN, i), vec_of(floats, DIRECTION, i)
         t = face_distance(o, d, face, is_disk, floats[T + i])
         t = INF if ints[LEFT + i] >> 1 == k else t
@@ -223,7 +232,7 @@ def _one_by_one(scene: Arrays, wave: Wave, n: int, k: int, rank: bool, scratch: 
     """What the rays meet of any object, those that come near it; if it `ranks`, of what medium."""
     floats, ints, queue = wave.floats, wave.ints, scratch.queues
     center, radius_squared = vec_at(scene.balls, k, 0), scene.balls[k, 3]
-    for i in range(min(n, SIZE)):
+    for i in range(padded(n)):
         o, d = vec_of(floats, ORIGIN, i), vec_of(floats, DIRECTION, i)
         far = far_from_ball(o, d, center, radius_squared)
         queue[i] = 0 if far and ints[LEFT + i] >> 1 != k else 1
@@ -251,7 +260,7 @@ def _one_by_one(scene: Arrays, wave: Wave, n: int, k: int, rank: bool, scratch: 
 def _settle(scene: Arrays, wave: Wave, n: int, rank: bool) -> None:
     """The media before and beyond what is hit."""
     ints, solids = wave.ints, scene.solids
-    for i in range(min(n, SIZE)):
+    for i in range(padded(n)):
         (hit, entering), medium = side_of(ints[HIT + i]), ints[MEDIUM + i]
         before = ints[BEFORE + i] if medium == UNKNOWN else medium
         beyond = ints[BEYOND + i]
