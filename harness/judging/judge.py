@@ -23,6 +23,7 @@ from harness.measure import (
     light_observables,
     radiance,
     ray_observables,
+    symmetry_observables,
     total_light,
 )
 from harness.measure.agreement import optical_length, ray_agreement, variant_agreement
@@ -56,6 +57,8 @@ RAYS = {
     Observable.BREWSTER_ANGLE: flat_observables.brewster_angle,
     Observable.STACK_OFFSET: flat_observables.stack_offset,
     Observable.FOLDED_DIRECTION: flat_observables.folded_direction,
+    Observable.RETURN_ERROR: symmetry_observables.return_error,
+    Observable.SKEWNESS: symmetry_observables.skewness,
     Observable.REVERSIBILITY: flat_observables.reversibility,
     Observable.SAGITTAL_DEPTH: flat_observables.sagittal_depth,
     Observable.TANGENTIAL_DEPTH: flat_observables.tangential_depth,

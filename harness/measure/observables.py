@@ -53,6 +53,11 @@ class Observable(enum.StrEnum):
         "µrad",
         "direction of a ray out of a reflecting prism, against the one mirrored in its faces",
     )
+    RETURN_ERROR = (
+        "return_error",
+        "µrad",
+        "angle between a ray out of a corner cube and the way it came",
+    )
     REVERSIBILITY = "reversibility", "µrad", "whether a reversed ray takes the same way back"
     SAGITTAL_DEPTH = "sagittal_depth", "units", "apparent depth across the plane of incidence"
     TANGENTIAL_DEPTH = "tangential_depth", "units", "apparent depth in the plane of incidence"
@@ -70,6 +75,7 @@ class Observable(enum.StrEnum):
         "units",
         "the one point where a Cartesian surface focuses rays of any height",
     )
+    SKEWNESS = "skewness", "units", "index x distance from an axis x sine of the angle to it"
     RAINBOW_ANGLE = "rainbow_angle", "deg", "angle of a rainbow from the point opposite to the sun"
     OPTICAL_LENGTH = "optical_length", "units", "optical length of the path: sum of index x way"
     VARIANT_AGREEMENT = (
@@ -138,6 +144,7 @@ DIRECTION_OBSERVABLES = frozenset(
         Observable.DEVIATION,
         Observable.MINIMUM_DEVIATION,
         Observable.FOLDED_DIRECTION,
+        Observable.RETURN_ERROR,
         Observable.REVERSIBILITY,
         Observable.RAINBOW_ANGLE,
     }

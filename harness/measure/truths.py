@@ -89,6 +89,17 @@ TRUTHS = {
         "W. J. Smith, Modern Optical Engineering, 4th ed., chapter 7: tunnel diagrams",
         "prisms that unfold to a plate with parallel faces", _DIRECTION,
     ),
+    Observable.RETURN_ERROR: Truth(
+        "2 asin(sin(e) sin(angle to the edge)) in the glass, refracted; for small e, at right "
+        "angles to the front, 2 sqrt(2 / 3) n e",
+        "P. R. Yoder, J. Opt. Soc. Am. 48, 496 (1958); expected_systems.corner_cube_return",
+        "corner cubes with one angle off by e", _DIRECTION,
+    ),
+    Observable.SKEWNESS: Truth(
+        "n (r x d) . a, the same before and behind",
+        "Snell's law in vector form along a normal that meets the axis: expected_systems.skewness",
+        "solids that are round about one axis", _DIRECTION,
+    ),
     Observable.REVERSIBILITY: Truth(
         "the reversed ray leaves as the first one came",
         f"{BORN_WOLF}, section 3.1.2: rays do not know their sense",
@@ -227,11 +238,15 @@ QUANTITIES = (
     Quantity("apparent depth, tangential", Observable.TANGENTIAL_DEPTH, ("apparent-depth-pool",)),
     Quantity("apparent depth, sagittal", Observable.SAGITTAL_DEPTH, ("apparent-depth-pool",)),
     Quantity("corner cube", Observable.FOLDED_DIRECTION, ("retroreflector-corner-cube",)),
+    Quantity("corner cube with a wrong angle", Observable.RETURN_ERROR,
+             ("retroreflector-wrong-angle",)),
     Quantity("TIR prisms", Observable.FOLDED_DIRECTION,
              ("tir-prism-right-angle", "tir-prism-porro", "light-pipe-rod")),
     Quantity("n^2 law of radiance", Observable.TRANSMITTANCE, ("n2-camera-in-glass",)),
     Quantity("etendue", Observable.TRANSMITTANCE, ("n2-camera-in-glass",),
              "n^2 dA cos(theta) dOmega is kept where radiance / n^2 is, as some renderers claim"),
+    Quantity("etendue of skew rays", Observable.SKEWNESS, ("cylinder-skew",),
+             "what is round about an axis keeps etendue for each skewness by itself"),
     Quantity("optical path length (Fermat)", Observable.OPTICAL_LENGTH,
              ("fermat-slab", "lens-biconvex", "cartesian-ellipsoid")),
     Quantity("aplanatic points of a sphere", Observable.APLANATIC_IMAGE, ("aplanatic-sphere",)),

@@ -6,6 +6,7 @@ A tolerance is 8 eps times a condition number, as in `test_expected`.
 from __future__ import annotations
 
 import math
+from itertools import permutations
 
 import numpy as np
 import pytest
@@ -157,3 +158,57 @@ def test_a_slab_in_nature(row: Row) -> None:
     for value, truth in zip((x for pair in both for x in pair), row.v[:4], strict=True):
         # Fresnel coefficients near grazing incidence are ill-conditioned: 1 / cos.
         assert abs(float(value) - float(truth)) <= 64 * EPS / cos_i
+
+
+def corner_cube(n: float, e: float) -> tuple[np.ndarray, ...]:
+    """Front and mirrors of a cube whose first two faces meet at pi / 2 + e, towards the inside."""
+    first, second = np.array([1.0, 0, 0]), np.array([math.sin(e), math.cos(e), 0])
+    edges = np.array([[math.cos(e), -math.sin(e), 0], [0, 1, 0], [0, 0, 1]])
+    front = np.cross(edges[1] - edges[0], edges[2] - edges[0])
+    return front / np.linalg.norm(front), first, second, np.array([0, 0, 1.0])
+
+
+@pytest.mark.parametrize("n", [1.0, 1.5168, 1.7847])
+@pytest.mark.parametrize("e", [1e-6, 1e-3])
+def test_a_corner_cube_sends_back_what_yoder_says(n: float, e: float) -> None:
+    """2 sqrt(2 / 3) n e, seen at right angles to the front; what is left is of second order."""
+    front, first, second, _ = (v[None] for v in corner_cube(n, e))
+    back = expected_systems.corner_cube_return(-front, front, first, second, np.array([n]))
+    error = math.atan2(np.linalg.norm(np.cross(back, front)), float((back * front).sum()))
+    assert abs(error - 2 * math.sqrt(2 / 3) * n * e) <= 4 * n * e**2 + 8 * EPS
+
+
+@pytest.mark.parametrize("order", list(permutations(range(3))))
+@pytest.mark.parametrize("e", [0.0, 0.01, -0.2])
+def test_three_mirrors_one_after_another_send_back_the_same(
+    order: tuple[int, ...], e: float
+) -> None:
+    n, (front, *mirrors) = 1.5168, corner_cube(1.5168, e)
+    d = np.array([-0.4, -0.7, -0.5])
+    d /= np.linalg.norm(d)
+    one, glass = np.array([1.0]), np.array([n])
+    ray, _ = expected.refract(d[None], front[None], one, glass)
+    for k in order:
+        ray = expected.reflect(ray, mirrors[k][None])
+    out, _ = expected.refract(ray, -front[None], glass, one)
+    first, second = (mirrors[k][None] for k in order if k != 2)
+    closed = expected_systems.corner_cube_return(d[None], front[None], first, second, glass)
+    # Twelve steps of a few roundings each.
+    np.testing.assert_allclose(closed, out, rtol=0, atol=64 * EPS)
+
+
+@given(st.floats(0.01, 3.1), st.floats(-0.9, 0.9), st.floats(1.01, 2.5))
+def test_no_surface_that_is_round_about_an_axis_changes_skewness(
+    turn: float, slope: float, n: float
+) -> None:
+    """The normal is any that meets the axis z or is parallel to it: here, of a cone."""
+    axis, point = np.array([0, 0, 1.0]), np.array([[math.cos(turn), math.sin(turn), 0.3]])
+    normal = np.column_stack([point[:, :2], [slope]]) / math.hypot(1, slope)
+    d = np.array([[-0.6, 0.64, 0.48]])
+    facing = normal if (d * normal).sum() < 0 else -normal
+    bent, total = expected.refract(d, facing, np.array([1.0]), np.array([n]))
+    assert not total.any()
+    before, behind = (
+        expected_systems.skewness(point, ray, axis, ior) for ray, ior in ((d, 1.0), (bent, n))
+    )
+    assert abs(before - behind) <= 32 * EPS * n
