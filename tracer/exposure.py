@@ -76,7 +76,7 @@ def exposure(
     floats, ints = np.empty((waves, FLOATS)), np.empty((waves, INTS), np.int64)
     filled, inside = np.empty(waves, np.int64), np.empty(waves, np.int64)
     waiting = Waiting(floats, ints, np.arange(waves), filled, inside)
-    scratch = Scratch(np.empty(4 * SIZE, np.int64), np.empty(GLASS), new_stack(scene))
+    scratch = Scratch(np.empty(4 * SIZE + 4, np.int64), np.empty(GLASS), new_stack(scene))
     return Exposure(limits, lobes, share, samples, waiting, scratch)
 
 

@@ -36,8 +36,11 @@ def open_face(rows: Rows, row: int) -> OpenFace:
 
 
 @inlined
-def face_distance(o: Vec, d: Vec, face: OpenFace, is_disk: bool, best: float) -> float:
-    """Distance to a rectangle or disk, from either side; infinite if missed or not before `best`.
+def face_hit(
+    o: Vec, d: Vec, face: OpenFace, is_disk: bool, best: float
+) -> tuple[float, float, float]:
+    """(distance, place along x, along y) of a rectangle or disk, from either side; infinitely far
+    if missed or not before `best`.
 
     Whatever lies behind the ray or beyond `best` is sorted out before anything is divided.
     """
@@ -45,7 +48,7 @@ def face_distance(o: Vec, d: Vec, face: OpenFace, is_disk: bool, best: float) ->
     if approach < 0.0:
         height, approach = -height, -approach
     if not 0.0 < height < best * approach:
-        return INF
+        return INF, 0.0, 0.0
     t = height / approach
     p = sub(along(o, t, d), face.center)
     x, y = dot(p, face.x), dot(p, face.y)
@@ -53,4 +56,4 @@ def face_distance(o: Vec, d: Vec, face: OpenFace, is_disk: bool, best: float) ->
         inside = x * x + y * y <= face.half_x * face.half_x
     else:
         inside = abs(x) <= face.half_x and abs(y) <= face.half_y
-    return t if inside else INF
+    return t if inside else INF, x, y

@@ -21,7 +21,7 @@ from tracer.arrays import (
     Floats,
 )
 from tracer.compiled import inlined, merged
-from tracer.faces import face_distance, open_face
+from tracer.faces import face_hit, open_face
 from tracer.mesh import smooth_normal, triangle_normal
 from tracer.shapes import (
     HOLLOW,
@@ -209,7 +209,7 @@ def object_hit(
     if kind == CELL:
         return _cell_hit(scene, i, o, d, leaving, on_face >= 0)
     face = open_face(scene.rows, scene.objects[i, FIRST])
-    t = face_distance(o, d, face, kind == DISK, t_max)
+    t, _, _ = face_hit(o, d, face, kind == DISK, t_max)
     return t, 0, dot(d, face.z) < 0.0
 
 

@@ -114,3 +114,10 @@ def surroundings(scene: Arrays, d: Vec) -> Vec:
     if scene.background[0, 0] == CONSTANT:
         return vec_at(scene.background, 0, 1)
     return panorama_radiance(scene.background[0], scene.texels, d)
+
+
+@inlined
+def is_dark(scene: Arrays) -> bool:
+    """Whether nothing is seen where nothing is."""
+    row = scene.background[0]
+    return bool(row[0] == CONSTANT and row[1] == 0.0 and row[2] == 0.0 and row[3] == 0.0)

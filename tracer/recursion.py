@@ -32,13 +32,15 @@ from tracer.exposure import (
 )
 from tracer.hit import NOTHING, Hit, hit_point
 from tracer.inside import put_in_ball, put_in_cell, refract_in_balls
-from tracer.light import absorbed, surroundings
+from tracer.light import absorbed, is_dark, surroundings
 from tracer.shapes import INF
 from tracer.surface import Lobes, emitted, refracted, scatter, upright
-from tracer.vector import Vec, along, mul, scale
+from tracer.vector import Vec, mul, scale
 from tracer.wave import (
     HIT,
     IN,
+    PLACE_X,
+    PLACE_Y,
     SIZE,
     WEIGHT,
     Ints,
@@ -52,6 +54,9 @@ from tracer.wave import (
     side_of,
     vec_of,
 )
+
+# Queues of rays that meet the same: of DIELECTRIC and EMISSIVE, of other materials, of nothing.
+REST, NONE = 2, 3
 
 
 class Rows(NamedTuple):
@@ -101,17 +106,15 @@ def _sort_out(scene: Arrays, wave: Wave, n: int, queues: Ints) -> tuple[int, int
 
     What is done next is then the same for many rays in turn. No branch here depends on a ray.
     """
-    nothing = lamps = glass = rest = 0
+    filled = queues[4 * SIZE :]
+    filled[:4] = 0
     for i in range(min(n, SIZE)):
         hit, _ = side_of(wave.ints[HIT + i])
-        material, missed = scene.objects[max(hit, 0), MATERIAL], hit == NOTHING
-        queues[nothing], queues[SIZE + lamps] = i, i
-        queues[2 * SIZE + glass], queues[3 * SIZE + rest] = i, i
-        nothing += missed
-        lamps += (not missed) & (material == EMISSIVE)
-        glass += (not missed) & (material == DIELECTRIC)
-        rest = i + 1 - nothing - lamps - glass
-    return nothing, lamps, glass, rest
+        which = min(scene.objects[max(hit, 0), MATERIAL], REST) if hit != NOTHING else NONE
+        at = filled[which & 3]
+        queues[(which * SIZE + at) & (4 * SIZE - 1)] = i
+        filled[which & 3] = at + 1
+    return filled[NONE], filled[EMISSIVE], filled[DIELECTRIC], filled[REST]
 
 
 @called
@@ -131,13 +134,13 @@ def _absorb(scene: Arrays, wave: Wave, n: int) -> None:
 def _see(scene: Arrays, exposure: Exposure, wave: Wave, nothing: int, lamps: int) -> None:
     """The ways that end, in the surroundings or on a lamp."""
     queues = exposure.scratch.queues
-    for q in range(nothing):
-        ray = ray_at(wave, queues[q] & IN)
+    for q in range(0 if is_dark(scene) else nothing):
+        ray = ray_at(wave, queues[NONE * SIZE + q] & IN)
         _add(exposure, ray.pixel, mul(ray.weight, surroundings(scene, ray.d)))
     for q in range(lamps):
-        i = queues[SIZE + q] & IN
+        i = queues[EMISSIVE * SIZE + q] & IN
         ray, hit = ray_at(wave, i), hit_at(wave, i)
-        shown = emitted(scene, hit.object, along(ray.o, hit.t, ray.d))
+        shown = emitted(scene, hit.object, wave.floats[PLACE_X + i], wave.floats[PLACE_Y + i])
         _add(exposure, ray.pixel, mul(ray.weight, shown))
         _note_gap(exposure, ray, hit.t)
 
@@ -169,7 +172,7 @@ def _reach_glass(scene: Arrays, exposure: Exposure, wave: Wave, count: int) -> N
     """Where rays meet glass, and what it is like there."""
     scratch, glass = exposure.scratch, exposure.scratch.glass
     for q in range(min(count, SIZE)):
-        i = scratch.queues[2 * SIZE + q] & IN
+        i = scratch.queues[DIELECTRIC * SIZE + q] & IN
         ray, hit = ray_at(wave, i), hit_at(wave, i)
         p, n, geometric = hit_point(scene, ray.o, hit.t, ray.d, hit.object, hit.face, hit.entering)
         wi = scale(-1.0, ray.d)
@@ -199,7 +202,7 @@ def _split(scene: Arrays, exposure: Exposure, wave: Wave, count: int, rows: Rows
     """Lays two rays aside for each that meets glass, where they are worth it."""
     scratch, glass, aside = exposure.scratch, exposure.scratch.glass, Aside(0, 0, 0)
     for q in range(min(count, SIZE)):
-        i = scratch.queues[2 * SIZE + q] & IN
+        i = scratch.queues[DIELECTRIC * SIZE + q] & IN
         ray, hit, p = ray_at(wave, i), hit_at(wave, i), vec_of(glass, POINT, q)
         _note_gap(exposure, ray, hit.t)
         wr, reflected = vec_of(glass, REFLECTED, q), scale(glass[R + q], ray.weight)
@@ -265,7 +268,7 @@ def _scatter(scene: Arrays, exposure: Exposure, wave: Wave, count: int, rows: Ro
     """As `_split`, behind `at` rays, for those that meet neither a lamp nor glass."""
     stack = exposure.scratch.stack
     for q in range(count):
-        i = exposure.scratch.queues[3 * SIZE + q] & IN
+        i = exposure.scratch.queues[REST * SIZE + q] & IN
         ray, hit = ray_at(wave, i), hit_at(wave, i)
         k, medium = hit.object, hit.medium
         _note_gap(exposure, ray, hit.t)

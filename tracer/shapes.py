@@ -363,9 +363,7 @@ def bound_normal(p: Vec, rows: Rows, row: int) -> Vec:
 
 
 @inlined
-def face_coordinates(p: Vec, rows: Rows, row: int) -> tuple[float, float]:
-    """Texture coordinates (u, v) of a point on a rectangle or disk, each in [0, 1]."""
-    from_center = sub(p, vec_at(rows, row, 0))
-    u = 0.5 + 0.5 * dot(from_center, vec_at(rows, row, 3)) / rows[row, 12]
-    v = 0.5 + 0.5 * dot(from_center, vec_at(rows, row, 6)) / rows[row, 13]
+def face_coordinates(x: float, y: float, rows: Rows, row: int) -> tuple[float, float]:
+    """Texture coordinates (u, v) in [0, 1], at `x`, `y` from a rectangle's or disk's centre."""
+    u, v = 0.5 + 0.5 * x / rows[row, 12], 0.5 + 0.5 * y / rows[row, 13]
     return min(max(u, 0.0), 1.0), min(max(v, 0.0), 1.0)

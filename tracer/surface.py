@@ -133,11 +133,11 @@ def _slab_lobes(R: float, a: float, lobes: Lobes) -> tuple[float, float]:
 
 
 @inlined
-def emitted(scene: Arrays, hit: int, p: Vec) -> Vec:
-    """What an emissive surface shows at `p`."""
+def emitted(scene: Arrays, hit: int, x: float, y: float) -> Vec:
+    """What an emissive surface shows; at `x`, `y` from its centre, if it is a rectangle or disk."""
     u, v = 0.5, 0.5
     if scene.objects[hit, SHAPE] >= RECTANGLE:
-        u, v = face_coordinates(p, scene.rows, scene.objects[hit, FIRST])
+        u, v = face_coordinates(x, y, scene.rows, scene.objects[hit, FIRST])
     return pattern_radiance(scene.patterns, scene.objects[hit, PATTERN], scene.texels, u, v)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tracer.arrays import AMBIENT, DISK, FIRST, RECTANGLE, SHAPE, SPHERE, Arrays, Floats
 from tracer.compiled import called, inlined, merged
-from tracer.faces import face_distance, open_face
+from tracer.faces import face_hit, open_face
 from tracer.hit import (
     NOTHING,
     UNKNOWN,
@@ -30,7 +30,7 @@ from tracer.hit import (
     surface_left,
 )
 from tracer.shapes import INF, vec_at
-from tracer.vector import Vec, dot, sub
+from tracer.vector import Vec, along, dot, sub
 
 Ints = NDArray[np.int64]
 
@@ -41,8 +41,8 @@ IN = SIZE - 1  # ``i & IN`` is i, and tells the compiler that it is not negative
 
 # Where columns begin: of what a ray carries, and of what it meets. Those of vectors are three.
 ORIGIN, DIRECTION, WEIGHT = 0 * STRIDE, 3 * STRIDE, 6 * STRIDE
-T = 9 * STRIDE
-FLOATS = 23 * STRIDE  # those behind T are used by `tracer.inside`
+T, PLACE_X, PLACE_Y = (k * STRIDE for k in range(9, 12))  # where on a rectangle or disk
+FLOATS = 23 * STRIDE  # from T on, `tracer.inside` has columns of its own
 PIXEL, SEGMENTS, MEDIUM, LEFT, LEFT_FACE = (k * STRIDE for k in range(5))
 HIT, FACE, BEFORE, BEYOND = (k * STRIDE for k in range(5, 9))
 INTS = 9 * STRIDE
@@ -72,7 +72,7 @@ class Ray(NamedTuple):
 class Scratch(NamedTuple):
     """What is needed to treat one wave."""
 
-    queues: Ints  # (4 SIZE,)
+    queues: Ints  # (4 SIZE + 4,): four queues, and how many are in each
     glass: Floats  # see `recursion`
     stack: Floats  # see `hit.new_stack`
 
@@ -207,7 +207,11 @@ def _begin_outside(scene: Arrays, wave: Wave, n: int) -> bool:
 @called
 def _spheres(scene: Arrays, wave: Wave, n: int, k: int) -> None:
     floats, ints = wave.floats, wave.ints
-    row = scene.objects[k, FIRST]
+    row, gone = scene.objects[k, FIRST], 0
+    while gone < n and ints[LEFT + gone] == sided(k, False):
+        gone += 1
+    if gone == n:
+        return  # all have left it, as a whole wave does that was inside
     center, radius = vec_at(scene.rows, row, 0), scene.rows[row, 3]
     for i in range(padded(n)):
         o, d = vec_of(floats, ORIGIN, i), vec_of(floats, DIRECTION, i)
@@ -222,8 +226,10 @@ def _faces(scene: Arrays, wave: Wave, n: int, k: int, is_disk: bool) -> None:
     face = open_face(scene.rows, scene.objects[k, FIRST])
     for i in range(padded(n)):
         o, d = vec_of(floats, ORIGIN, i), vec_of(floats, DIRECTION, i)
-        t = face_distance(o, d, face, is_disk, floats[T + i])
+        t, x, y = face_hit(o, d, face, is_disk, floats[T + i])
         t = INF if ints[LEFT + i] >> 1 == k else t
+        floats[PLACE_X + i] = x if t < floats[T + i] else floats[PLACE_X + i]
+        floats[PLACE_Y + i] = y if t < floats[T + i] else floats[PLACE_Y + i]
         _nearer(wave, i, k, t, dot(d, face.z) < 0.0)
 
 
@@ -276,10 +282,15 @@ def _pass_hidden(scene: Arrays, wave: Wave, n: int, stack: Floats) -> None:
     for i in range(min(n, SIZE)):
         if 0 <= ints[HIT + i] < 2 * scene.solids and ints[BEFORE + i] == ints[BEYOND + i]:
             ray = ray_at(wave, i)
-            left, face = ray.left, ray.left_face
+            left, on = ray.left, ray.left_face
             hit = nearest_hit(
-                scene, ray.o, ray.d, ray.medium, left, face, ray.inward, stack[:0], stack
+                scene, ray.o, ray.d, ray.medium, left, on, ray.inward, stack[:0], stack
             )
             floats[T + i] = hit.t
+            if scene.objects[max(hit.object, 0), SHAPE] >= RECTANGLE:
+                face = open_face(scene.rows, scene.objects[hit.object, FIRST])
+                from_center = sub(along(ray.o, hit.t, ray.d), face.center)
+                floats[PLACE_X + i] = dot(from_center, face.x)
+                floats[PLACE_Y + i] = dot(from_center, face.y)
             ints[HIT + i], ints[FACE + i] = sided(hit.object, hit.entering), hit.face
             ints[BEFORE + i], ints[BEYOND + i] = hit.medium, hit.beyond

@@ -82,7 +82,7 @@ def test_waves_meet_what_single_rays_do(apart: bool) -> None:
         rng = np.random.default_rng(seed)
         scene = flatten(scene_of(rng, apart))
         assert scene.apart == apart
-        scratch = Scratch(np.zeros(4 * SIZE, np.int64), np.zeros(GLASS), new_stack(scene))
+        scratch = Scratch(np.zeros(4 * SIZE + 4, np.int64), np.zeros(GLASS), new_stack(scene))
         wave = Wave(np.zeros(FLOATS), np.full(INTS, -7))  # what is left of earlier waves
         column = [wave.floats[k * STRIDE : k * STRIDE + N] for k in range(6)]
         ints = {at: wave.ints[at : at + N] for at in (LEFT, LEFT_FACE, MEDIUM, HIT, FACE)}
