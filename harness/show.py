@@ -32,7 +32,7 @@ MOST_PROBLEMS = 20
 
 @contextmanager
 def progress(console: Console | None = None) -> Iterator[Callable[[Progress], None]]:
-    """A bar over all renders; in a log file, where bars are noise, a line now and then."""
+    """A bar over all renders; nothing in a log file, where bars are noise."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
@@ -40,7 +40,12 @@ def progress(console: Console | None = None) -> Iterator[Callable[[Progress], No
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
         TextColumn("{task.fields[message]}"),
     )  # fmt: skip
-    with Bar(*columns, console=console or Console(stderr=True), transient=True) as bar:
+    console = console or Console(stderr=True)
+    # Drawing it takes ten milliseconds, also where nobody sees it.
+    with Bar(
+        *columns, console=console, transient=True, auto_refresh=console.is_terminal,
+        refresh_per_second=4,
+    ) as bar:  # fmt: skip
         task = bar.add_task("renders", total=None, message="getting renderers ready")
 
         def update(state: Progress) -> None:

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from harness.errors import RendererError, RendererFailed, RendererMissing, RendererUnsupported
 from harness.renderers.confinement import Confinement
-from harness.renderers.limits import OUTPUT_MB, POLL_S, Watch
+from harness.renderers.limits import OUTPUT_MB, Watch
 from harness.renderers.process import describe_signal, tail
 from harness.renderers.process_tree import ProcessTree, spawn
 from harness.renderers.wire import Reply
@@ -147,7 +147,7 @@ class Child:
         pipe = self._tree.process.stdout
         assert pipe is not None
         while b"\n" not in self._buffer:
-            if select.select([pipe], [], [], POLL_S)[0]:
+            if select.select([pipe], [], [], watch.rest_s(deadline))[0]:
                 chunk = os.read(pipe.fileno(), 1 << 16)
                 if not chunk:
                     raise _Broken(self._death())

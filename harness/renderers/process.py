@@ -13,7 +13,7 @@ from pathlib import Path
 
 from harness.errors import RendererFailed
 from harness.renderers.confinement import Confinement
-from harness.renderers.limits import LOG_MB, OUTPUT_MB, POLL_S, Watch
+from harness.renderers.limits import LOG_MB, OUTPUT_MB, Watch
 from harness.renderers.process_tree import ProcessTree, spawn
 
 LOG_CHARACTERS = 4000  # how much of a log an error carries
@@ -51,8 +51,8 @@ def run_limited(
     * `timeout_s` of wall time; on Linux also that much processor time on every core.
     * `memory_mb` of resident memory, summed over the program and all that it starts. Resident
       rather than reserved memory (RLIMIT_AS), because compilers and garbage collectors reserve
-      many times what they use. It is looked at every 50 ms, so a program that fills memory at
-      full speed can overshoot by what it touches in that time.
+      many times what they use. It is looked at every 50 ms where little is left, so a program
+      that fills memory at full speed can overshoot by what it touches in that time.
     * `output_mb` for each file that it writes (Linux) and for all files in `private` together,
       and 64 MB for its stdout and stderr.
     * 256 processes.
@@ -125,7 +125,7 @@ def _wait(
 ) -> float:
     """Waits for the end; returns processor seconds. Raises _Limit."""
     while True:
-        streams.pump(POLL_S)
+        streams.pump(watch.rest_s(deadline))
         usage = _reap(tree.process, os.WNOHANG)
         if usage is not None:
             streams.drain()

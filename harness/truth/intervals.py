@@ -57,8 +57,9 @@ def planes_chord(planes: Float, o: Float, d: Float, chunk: int = 1 << 15) -> Cho
         height = planes[:, 3] - o[rows] @ planes[:, :3].T
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             t = height / slope
-        entering = np.where(slope < 0, t, np.where((slope == 0) & (height < 0), np.inf, -np.inf))
-        leaving = np.where(slope > 0, t, np.inf)
+        entering, leaving = np.where(slope < 0, t, -np.inf), np.where(slope > 0, t, np.inf)
+        if not slope.all():  # parallel to a plane and beyond it, a line never enters
+            entering[(slope == 0) & (height < 0)] = np.inf
         first, last = entering.argmax(1), leaving.argmin(1)
         index = np.arange(len(first))
         out[0][rows], out[1][rows] = entering[index, first], leaving[index, last]

@@ -287,9 +287,12 @@ def _next_interface(
             else:
                 leaves = np.where(within & there & (c.t_out > 0), c.t_out, np.inf)
             t = np.where(within, leaves, np.where(there & (c.t_in > 0), c.t_in, np.inf))
+            n = np.where(within[:, None], c.n_out, c.n_in)
+            if k == 0 and c is parts[0]:  # alone so far; where it is missed, no normal counts
+                best, normal = t, n
+                continue
             nearer = t < best
             best = np.where(nearer, t, best)
-            n = np.where(within[:, None], c.n_out, c.n_in)
             normal, which = np.where(nearer[:, None], n, normal), np.where(nearer, k, which)
     return best, normal, which
 

@@ -28,6 +28,9 @@ from harness.preflight import FLOAT32, FLOAT64, Preflight
 from harness.record import Check, Verdict
 from harness.renderers import registry
 from harness.renderers.base import Capability, Image, RayPaths, Status
+from harness.renderers.mitsuba import StockEngine
+from harness.renderers.needs import needs
+from harness.renderers.povray import PovRayRenderer, StockPovRayRenderer
 from harness.report.mathml import typeset
 from harness.scene import model
 from harness.scene.load import LoadedCase, load_cases, scene_files
@@ -54,6 +57,12 @@ PLATES = (
     "retroreflector",
     "light-pipe",
 )
+# What the renderers claim of which a scene documents anything.
+CLAIMED = {
+    "mitsuba": StockEngine.capabilities,
+    "povray": PovRayRenderer.capabilities,
+    "povray-stock": StockPovRayRenderer.capabilities,
+}
 
 
 @cache
@@ -157,6 +166,16 @@ def test_every_case_names_its_truth_and_its_sources(name: str) -> None:
         else:
             assert Observable(check.observable) not in TRUTHS
             assert check.against == "renderers" or check.against in registry.available()
+
+
+@pytest.mark.parametrize("name", list(first_cases()))
+def test_what_is_documented_of_a_renderer_it_can_be_asked_for(name: str) -> None:
+    """Or nobody has ever measured it, and it would excuse what comes one day."""
+    case = prepare(first_cases()[name])
+    for known in (known for check in case.loaded.model.checks for known in check.known):
+        claimed = CLAIMED[known.renderer]
+        scenes = (expand_thin_slabs(form.scene) for form in case.forms)
+        assert any(needs(scene) <= claimed for scene in scenes), known
 
 
 @pytest.mark.parametrize("quantity", QUANTITIES, ids=lambda q: q.name)

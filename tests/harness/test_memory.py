@@ -6,6 +6,9 @@ import subprocess
 import sys
 import threading
 
+import psutil
+import pytest
+
 from harness.running.memory import memory_mb, watched
 
 HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(); sys.stdin.read()"
@@ -13,8 +16,10 @@ HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(); sys.stdin.r
 
 def test_the_largest_look_counts() -> None:
     looks, third = iter([3.0, 8.0]), threading.Event()
+    told: list[float] = []
 
-    def look() -> float:
+    def look(seen: float) -> float:
+        told.append(seen)
         found = next(looks, None)
         if found is None:
             third.set()
@@ -23,11 +28,12 @@ def test_the_largest_look_counts() -> None:
     with watched(look, period_s=0.001) as peak:
         assert third.wait(10)
     assert peak.mb == 8.0
+    assert told[:3] == [0.0, 3.0, 8.0]
 
 
 def test_a_last_look_is_taken_however_short_the_run_was() -> None:
     looks = []
-    with watched(lambda: looks.append(1) or float(len(looks)), period_s=60) as peak:
+    with watched(lambda _: looks.append(1) or float(len(looks)), period_s=60) as peak:
         pass
     assert peak.mb == len(looks) == 2
 
@@ -42,3 +48,15 @@ def test_what_children_hold_counts_until_they_end() -> None:
         during = memory_mb()
     assert during > before + 100
     assert memory_mb() < during - 90
+
+
+def test_pages_are_not_walked_through_where_all_that_is_resident_is_no_more_than_was_seen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def walked(_: psutil.Process) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(psutil.Process, "memory_full_info", walked)
+    assert memory_mb(seen=1e6) == 1e6
+    with pytest.raises(AssertionError):
+        memory_mb()
