@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from tracer.apart import BALL, CROWD, FLAT
 from tracer.arrays import ALONE, AMBIENT, COUNT, FIRST, Arrays, Floats
-from tracer.compiled import called, inlined
+from tracer.compiled import called, inlined, merged
 from tracer.exposure import Exposure, Limits, keep, note_gap, strength_of, wave_at, worth
 from tracer.light import absorbed
 from tracer.optics import cos_transmitted, fresnel_unpolarised
@@ -56,7 +56,7 @@ BOTH = 3
 # --- in balls -------------------------------------------------------------------------------------
 
 
-@inlined
+@merged
 def put_in_ball(scene: Arrays, exposure: Exposure, wave: Wave, i: int, n: Vec, ray: Ray) -> None:
     """Where a `ray` has entered a ball; `n` is the normal there."""
     floats, ints, media = wave.floats, wave.ints, scene.media
@@ -122,7 +122,7 @@ def _reflect_in_balls(limits: Limits, wave: Wave, outside: Wave, n: int) -> None
 # --- in cells between planes ----------------------------------------------------------------------
 
 
-@inlined
+@merged
 def put_in_cell(scene: Arrays, wave: Wave, i: int, ray: Ray) -> None:
     """Where a `ray` has entered one."""
     put_ray(wave, i, ray)
@@ -131,7 +131,7 @@ def put_in_cell(scene: Arrays, wave: Wave, i: int, ray: Ray) -> None:
     wave.floats[IOR_T + i] = scene.media[AMBIENT, 0]
 
 
-@called
+@merged
 def _cross_cells(
     objects: Ints, rows: Floats, media: Floats, closest: Floats, wave: Wave, n: int
 ) -> None:
@@ -158,7 +158,7 @@ def _cross_cells(
         put_vec(floats, WEIGHT, i, weight)
 
 
-@called
+@merged
 def _meet_plane(wave: Wave, n: int, k: int, row: int, normal: Vec, offset: float) -> None:
     """For the rays in solid `k`, but those that have met this plane last."""
     floats, ints = wave.floats, wave.ints
@@ -224,7 +224,7 @@ def _fate(limits: Limits, stays: Vec, leaves: Vec, segments: int) -> int:
     )
 
 
-@called
+@merged
 def _part(
     cut: Floats, share: float, wave: Wave, outside: Wave, n: int, left: int
 ) -> tuple[int, int]:

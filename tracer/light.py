@@ -116,7 +116,7 @@ def surroundings(scene: Arrays, d: Vec) -> Vec:
     return panorama_radiance(scene.background[0], scene.texels, d)
 
 
-@inlined
+@merged
 def is_dark(scene: Arrays) -> bool:
     """Whether nothing is seen where nothing is."""
     row = scene.background[0]

@@ -219,7 +219,7 @@ def _split(scene: Arrays, exposure: Exposure, wave: Wave, count: int, rows: Rows
     return aside
 
 
-@inlined
+@merged
 def _lay_inside(
     scene: Arrays, exposure: Exposure, rows: Rows, aside: Aside, n: Vec, ray: Ray
 ) -> Aside:
