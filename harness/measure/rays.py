@@ -63,6 +63,19 @@ def from_paths(paths: RayPaths) -> RayMeasurement:
     )  # fmt: skip
 
 
+def _order(truth: ProbeTruth) -> Float:
+    """(m,) 1 where a ray passes the first plane first, -1 where the second.
+
+    By where the true ray meets them, not by its direction: a measured one may go anywhere, even
+    backwards. Where the true ray meets neither, as most of the others do.
+    """
+    first, second = (landing.point for landing in truth.landings)
+    signs = np.sign(np.einsum("ij,ij->i", second - first, truth.paths.direction))
+    known = np.isfinite(signs) & (signs != 0)
+    usual = -1.0 if (signs[known] < 0).sum() > known.sum() / 2 else 1.0
+    return np.asarray(np.where(known, signs, usual))
+
+
 def from_images(
     images: Images,
     truth: ProbeTruth,
@@ -90,9 +103,7 @@ def from_images(
         gap = far - point
         length = np.linalg.norm(gap, axis=1)
         with np.errstate(invalid="ignore", divide="ignore"):
-            # The way between the planes, whichever of the two comes first.
-            sign = np.sign(np.einsum("ij,ij->i", gap, truth.paths.direction))
-            direction = gap / length[:, None] * sign[:, None]
+            direction = gap / length[:, None] * _order(truth)[:, None]
             direction_uncertainty = (uncertainty + far_uncertainty) / length
         seen, undecided = seen & far_seen, undecided | far_undecided
     weakest = truth.paths.weight * truth.landings[0].transmission.min(axis=1) * AMPLITUDE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -269,6 +270,39 @@ def test_images_and_a_ray_api_tell_the_same() -> None:
     apart = np.linalg.norm(np.cross(seen.direction, told.direction), axis=1)
     assert (apart <= seen.direction_uncertainty).all()
     assert (told.point_uncertainty == 0).all()
+
+
+def test_a_ray_that_goes_backwards_is_told_as_it_goes() -> None:
+    """More than a right angle off the true one: only the planes' order tells its sense."""
+    planes = (face(-2.0, size=40.0), face(-3.0, size=40.0))
+    tilt, small = math.radians(60), rs.Film(width=4, height=1)
+
+    def seen_along(x: float) -> rs.ResolvedScene:
+        camera = camera_of().model_copy(
+            update={"origin": (0, 0, 0), "forward": (x * math.sin(tilt), 0, -math.cos(tilt)),
+                    "right": (math.cos(tilt), 0, x * math.sin(tilt))}
+        )  # fmt: skip
+        return scene().model_copy(update={"camera": camera, "film": small})
+
+    truth, render = probe_truth(seen_along(1), "", planes), module().render
+    for order in ((0, 1), (1, 0)):
+        coded = {
+            (k, axis): render(
+                code_scene(seen_along(-1), planes[p], axis, 512, "").model_dump(mode="json")
+            ).astype(np.float32)
+            for k, p in enumerate(order)
+            for axis in "uv"
+        }  # fmt: skip
+        asked = replace(
+            truth, planes=tuple(planes[p] for p in order),
+            landings=tuple(truth.landings[p] for p in order),
+        )  # fmt: skip
+        found = from_images(coded, asked, 512, 2.0**-25, EPS, np.zeros(4, bool), None)
+        assert found.seen.all()
+        assert found.direction is not None
+        wanted = [-math.sin(tilt), 0, -math.cos(tilt)]
+        off = np.linalg.norm(found.direction - wanted, axis=1)
+        assert (off <= found.direction_uncertainty).all()
 
 
 def test_dark_and_broken_pixels_are_not_seen() -> None:
