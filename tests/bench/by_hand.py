@@ -2,8 +2,8 @@
 
 One ball of glass around the origin, a checkerboard behind it, one camera, all of them constants;
 no recursion, as the rays of a ball come one after the other. It follows the same rays as `tracer`,
-with the same formulas, to the same image. What it takes is what a tracer of any scene cannot come
-near, in the same language on the same machine.
+with the same formulas, to the same image. What it takes is what one ray at a time can reach, in
+the same language on the same machine.
 """
 
 from __future__ import annotations
