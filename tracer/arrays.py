@@ -46,8 +46,8 @@ POINT, DIRECTIONAL = 0.0, 1.0
 
 # Columns of Arrays.objects. A mesh's FIRST is its root node, its COUNT its first triangle.
 # MEDIUM and EXTERIOR are what a thin slab is made of and what is around it. In a solid, the k-th of
-# them, the medium is k + 1, so that it also says in which solid a ray is. ALONE
-# says whether nothing else comes near it (see `tracer.apart`).
+# them, the medium is k + 1, so that it also says in which solid a ray is. ALONE says whether
+# nothing else comes near it (see `tracer.apart`).
 SHAPE, FIRST, COUNT, MATERIAL, MEDIUM, EXTERIOR, PATTERN, NORMALS, ALONE = range(9)
 AMBIENT = 0  # the medium around all solids
 

@@ -92,7 +92,6 @@ def refract_in_balls(lobes: Lobes, wave: Wave, n: int) -> None:
         kept = vec_of(floats, STAYS, i)
         put_vec(floats, LEAVES, i, scale(passed if lobes.transmission else 0.0, kept))
         put_vec(floats, STAYS, i, scale(R if lobes.reflection or not transmits else 0.0, kept))
-        floats[BEND + i] = cos_theta_t - mu * cos_theta_i
 
 
 @called
@@ -114,9 +113,7 @@ def _reflect_in_balls(limits: Limits, wave: Wave, outside: Wave, n: int) -> None
         put_vec(floats, DIRECTION, i, along(d, -2.0 * cos_theta_i, n_out))
         put_vec(floats, WEIGHT, i, stays)
         ints[SEGMENTS + i] = segments
-        ints[FATE + i] = worth(limits, strength_of(leaves), segments) + 2 * worth(
-            limits, strength_of(stays), segments
-        )
+        ints[FATE + i] = _fate(limits, stays, leaves, segments)
 
 
 # --- in cells between planes ----------------------------------------------------------------------
@@ -219,6 +216,7 @@ def bounce(scene: Arrays, exposure: Exposure, height: int) -> tuple[int, int]:
 
 @inlined
 def _fate(limits: Limits, stays: Vec, leaves: Vec, segments: int) -> int:
+    """Which of the two are to be followed, of BOTH: 1 for what leaves, 2 for what stays."""
     return worth(limits, strength_of(leaves), segments) + 2 * worth(
         limits, strength_of(stays), segments
     )
