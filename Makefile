@@ -25,7 +25,7 @@ findings: setup ## Run the catalogue and write docs/findings.md from its records
 	@$(BIN)/snellcheck run --out reports/findings || test $$? -eq 1
 	@$(BIN)/snellcheck findings reports/findings --out docs/findings.md
 
-detection: setup ## Measure what is seen of wrong renderers, and write docs/detection.md (ten minutes)
+detection: rivals ## Measure what is seen of wrong renderers, and write docs/detection.md (ten minutes)
 	@$(BIN)/python -m tests.mutants.detection
 
 rivals: setup ## Install what `make detection` compares with besides its own rules: FLIP

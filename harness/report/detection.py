@@ -82,6 +82,8 @@ def read(data: Mapping[str, Any]) -> Detection:
     mutants, rivals = data["mutants"], data["rivals"]
     total = len(mutants)
     names = list(dict.fromkeys(name for seen in rivals.values() for name in seen))
+    # A rule that could not be asked about every fault would seem to be blind to some.
+    names = [name for name in names if all(seen[name] is not None for seen in rivals.values())]
     counts = [("snellcheck", sum(m["caught"] for m in mutants))]
     counts += [(name, sum(bool(seen[name]) for seen in rivals.values())) for name in names]
     classes = list(dict.fromkeys(limit["class"] for limit in data["limits"]))

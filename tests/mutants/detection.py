@@ -16,7 +16,7 @@ import os
 import platform
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -236,11 +236,16 @@ def document(data: dict[str, Any]) -> str:
             *("?" if seen[r] is None else "seen" if seen[r] else "–" for r in rules),
         ]  # fmt: skip
         lines.append("| " + " | ".join(cells) + " |")
-    seen_by = {rule: sum(bool(data["rivals"][m["name"]][rule]) for m in mutants) for rule in rules}
-    counts = ", ".join(f"{rule} {count}" for rule, count in seen_by.items())
+    counts = ", ".join(_seen_by(rule, data["rivals"].values()) for rule in rules)
     lines += ["", f"Seen of {len(mutants)}: snellcheck {caught}, {counts}.", ""]
     lines += _limit_lines(data) + RIM_LINES + _alarm_lines(data)
     return "\n".join(lines) + "\n"
+
+
+def _seen_by(rule: str, answers: Iterable[Mapping[str, bool | None]]) -> str:
+    """How many faults a rule sees; nothing of the kind where it could not be asked about all."""
+    seen = [answer[rule] for answer in answers]
+    return f"{rule} ?" if None in seen else f"{rule} {sum(map(bool, seen))}"
 
 
 def _cell(text: str) -> str:

@@ -52,6 +52,20 @@ def test_reports_show_the_data() -> None:
     assert all(len(wrong.seen) == len(shown.rules) - 1 for wrong in shown.wrong)
 
 
+def test_a_rule_that_was_not_asked_about_all_has_no_count() -> None:
+    """As FLIP where it is not installed."""
+    rivals: dict[str, Any] = {
+        name: {**seen, "FLIP": None if name == MUTANTS[0].name else seen["FLIP"]}
+        for name, seen in DATA_OF_NOW["rivals"].items()
+    }
+    data = {**DATA_OF_NOW, "rivals": rivals}
+    assert "FLIP ?." in document(data)
+    assert "FLIP ?." not in document(DATA_OF_NOW)
+    assert [rule.name for rule in read(data).rules] == [
+        rule.name for rule in read(DATA_OF_NOW).rules if rule.name != "FLIP"
+    ]
+
+
 def test_data_of_another_schema_are_not_shown() -> None:
     with pytest.raises(ValueError, match="snellcheck-detection/2"):
         read({**DATA_OF_NOW, "schema": "snellcheck-detection/2"})
