@@ -49,7 +49,7 @@ lint: setup ## Check style and types
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/mypy
 
-stress: setup ## Make faults on purpose, many of each, and write docs/reliability.md
+stress: fuzz ## Make faults on purpose, many of each, and write docs/reliability.md
 	@SNELLCHECK_STRESS=reports/stress $(BIN)/python -m pytest -q tests/stress
 	@$(BIN)/python scripts/reliability reports/stress
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from harness.scene.shape_model import Finite, Positive, Rgb, Strict
+from harness.scene.shape_model import Finite, Rgb, Strict
 
 Index = Annotated[float, Field(ge=0.001, le=1000, allow_inf_nan=False)]
 Wavelength = Annotated[
@@ -34,7 +34,10 @@ class Abbe(Strict):
     """The index at 587.56 nm, and the Abbe number (nd - 1) / (nF - nC)."""
 
     nd: Index
-    vd: Positive
+    vd: Annotated[
+        float,
+        Field(ge=1, le=1e6, allow_inf_nan=False, description="10 to 100 for glasses and fluids"),
+    ]
 
 
 class Medium(Strict):

@@ -174,6 +174,11 @@ def test_a_spectrum_has_the_media_at_each_wavelength(tmp_path: Path) -> None:
         ("{ sellmeier = { B = [1, 2], C = [0.1] } }", "", "coefficients go in pairs"),
         ("{ cauchy = { A = -2, B = 0 } }", "", "no index of refraction at 587.562 nm"),
         ("{ sellmeier = { B = [-3], C = [0.1] } }", "", "no index of refraction at 587.562 nm"),
+        (
+            "{ abbe = { nd = 1.5, vd = 1e-320 } }",
+            "",
+            "media.glass.abbe.vd: out of range; got 1e-320",
+        ),  # B = inf
         ("{ ior = 1.5 }", "[spectrum]\nstart = 400", "spectrum: says no wavelengths"),
         ("{ ior = 1.5 }", "[spectrum]\nwavelengths = [400, 700]\ncount = 3", "said twice"),
         ("{ ior = 1.5 }", "[spectrum]\nwavelengths = [500, 400]", "must rise"),
