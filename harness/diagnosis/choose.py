@@ -130,7 +130,7 @@ def cause_of(found: Fit, deviation: float, iors: tuple[float, ...]) -> Cause:
     return Cause(
         id=hypothesis.id, sentence=hypothesis.says(fitted), parameter=hypothesis.parameter,
         value=found.values[0] if has_value else None,
-        uncertainty=found.errors[0] if has_value and hypothesis.continuous else None,
+        uncertainty=(found.errors[0] or None) if has_value and hypothesis.continuous else None,
         unit=hypothesis.unit, residual=found.residual,
         explains=max(0.0, 1 - found.residual / deviation) if deviation > 0 else 0.0,
     )  # fmt: skip

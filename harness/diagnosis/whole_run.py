@@ -146,7 +146,7 @@ def _joint(
     explains it. Of others that of the case by which all cases together cost least, since a case
     with a second fault knows its own wrong one sharply; and then the mean over all cases that this
     explains, weighted by how sharply each knows its own. The error is two standard errors, or the
-    cases' own scatter where that is larger.
+    cases' own scatter where that is larger; 0 where no case knows it (where no ray arrives, say).
     """
     concerned = {case: fit for case, fit in fits.items() if fit.id and fit.fits}
     if not hypothesis.size or not concerned:
@@ -174,7 +174,8 @@ def _joint(
     rest = max(agreed, key=lambda f: f.information).values[1:]
     mean = float(np.average(first, weights=weights))
     spread = np.sqrt(np.average((first - mean) ** 2, weights=weights) / len(agreed))
-    return (mean, *rest), 2 * float(max(weights.sum() ** -0.5, spread))
+    known = any(fit.information > 0 for fit in agreed)
+    return (mean, *rest), 2 * float(max(weights.sum() ** -0.5, spread)) if known else 0.0
 
 
 def _belying(common: _Common, witnesses: Sequence[Witness]) -> str:
@@ -231,7 +232,7 @@ def _cause(common: _Common, cases: Mapping[str, Diagnosis], iors: tuple[float, .
     return Cause(
         id=hypothesis.id, sentence=hypothesis.says(Fitted(common.values, errors, iors)),
         parameter=hypothesis.parameter, value=common.values[0] if hypothesis.size else None,
-        uncertainty=common.error if hypothesis.size and hypothesis.continuous else None,
+        uncertainty=common.error or None if hypothesis.continuous else None,
         unit=hypothesis.unit,
         # The cost is n / 2 log(1 + q): the mean square that it stands for.
         residual=float(np.sqrt(np.expm1(min(2 * cost / max(rays, 1), 600)))),

@@ -9,7 +9,7 @@ from datetime import datetime
 from itertools import groupby
 
 from harness.record import RendererSummary, Summary, Verdict
-from harness.report.checks import FIRST_TO_LOOK_AT, CheckView, in_turns
+from harness.report.checks import FIRST_TO_LOOK_AT, CheckView, in_turns, who_is_off
 from harness.report.digest import Digest
 from harness.report.links import clean
 from harness.report.quantity import count, number
@@ -29,7 +29,7 @@ class Headline:
     """The run in one sentence. `state` is a verdict's name, for its colour and icon.
 
     `worst` is the check that failed by most, or else the one that came closest to its limit;
-    `lead` says which.
+    `lead` says which, and `off` who is off there.
     """
 
     state: str
@@ -38,16 +38,19 @@ class Headline:
     lead: str = ""
     worst: CheckView | None = None
     worst_case: str = ""
+    off: str = ""
 
 
 def headline(summary: Summary, digest: Digest) -> Headline:
     state, text = _sentence(summary, digest.counts)
     also = _also(summary, digest.counts)
-    if worst := digest.worst:
-        return Headline(state, text, also, "Worst:", worst.view, worst.case)
-    if closest := digest.closest:
-        return Headline(state, text, also, "Closest to its limit:", closest.view, closest.case)
-    return Headline(state, text, also)
+    found, lead = digest.worst, "Worst:"
+    if found is None:
+        found, lead = digest.closest, "Closest to its limit:"
+    if found is None:
+        return Headline(state, text, also)
+    off = clean(who_is_off(found.view.check))
+    return Headline(state, text, also, lead, found.view, found.case, off)
 
 
 MOST_FAILURES = 6

@@ -289,6 +289,18 @@ def test_two_faults_are_two_diagnoses() -> None:
     assert {tuple(d.cases) for d in found} == {("slab",), ("light",)}
 
 
+def test_an_uncertainty_that_no_ray_tells_is_not_told() -> None:
+    noise = np.random.default_rng(7)
+    world = BY_ID["index"].world(World.right(setting("snell")), (-0.01,))
+    known = diagnose("it", [shown_by(world, False, noise)])
+    assert known is not None
+    fits = [f.model_copy(update={"information": 0.0}) for f in known.fits]
+    (found,) = diagnose_run("it", {"snell": known.model_copy(update={"fits": fits})}, [])
+    assert found.cause is not None
+    assert found.cause.uncertainty is None
+    assert "±" not in found.sentence
+
+
 def test_a_case_that_knows_another_size_sharply_does_not_spoil_the_common_one() -> None:
     noise = np.random.default_rng(6)
     sizes = {"snell": -0.01, "slab-offset*0.25*": -0.01, "slab-offset*=1*": 0.02}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -77,6 +78,18 @@ def test_who_is_off_is_said_beside_the_check(tmp_path: Path) -> None:
     assert "off: mytracer" in page
     assert "two say so" in page
     assert "confidence" in page
+
+
+def test_the_banner_names_who_is_off_not_who_is_compared_with_it(tmp_path: Path) -> None:
+    off = Attribution(off=["mytracer"], how="truth", confidence=1.0, sentence="truth says so")
+    draft = Draft("slab", "A slab", "slab")
+    judged = check("ssim", "povray", 0.5, 1.0, 1e-4, "", against="mytracer")
+    draft.checks.append(judged.model_copy(update={"attribution": off}))
+    draft.runs += [run_of("povray", Verdict.FAIL), run_of("mytracer", Verdict.PASS)]
+    index, _ = pages(tmp_path, draft.finished())
+    banner = index[index.index('class="worst"') : index.index('class="counts"')]
+    words = " ".join(re.sub("<[^>]*>", " ", banner).split())
+    assert "slab mytracer ssim povray vs mytracer 0.5" in words
 
 
 def test_stored_results_are_marked(tmp_path: Path) -> None:
