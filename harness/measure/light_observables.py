@@ -13,9 +13,9 @@ from harness import expected
 from harness.expected import Float
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import nature, worst_level
-from harness.measure.pixel_areas import Grid, pixel_areas
+from harness.measure.pixel_areas import Grid, MeanLight, pixel_areas
 from harness.measure.precision import Precision
-from harness.measure.probe_truth import STEP, ProbeTruth
+from harness.measure.probe_truth import STEP, ProbeTruth, kept
 from harness.measure.statistics import Noise, binned
 from harness.probe.decode import lit_threshold
 from harness.renderers.base import Status
@@ -45,22 +45,28 @@ def sampled_path_weight(
 ) -> Comparison:
     """The same for a renderer that samples lobes and pixels: means over bins of like angle."""
     _, used = expected_level(truth, n2)
-    areas = pixel_areas(truth)
+    true = _mean_level(truth, n2)
+    used = used & true.whole
+    if not used.any():
+        raise Unmeasurable("every pixel of this path holds an edge")
+    rows = np.flatnonzero(used)
+    order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
+    comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true.level, order, noise)
+    comparison.detail.update(nature(truth, used) | truth.conditions(used))
+    return comparison
+
+
+@kept
+def _mean_level(truth: ProbeTruth, n2: bool) -> MeanLight:
+    """True pixel values of a renderer that samples pixels."""
 
     def light(grid: Grid) -> Float:
         level = grid.paths.weight[:, None] * grid.landing.transmission
         level = np.nan_to_num(level) * _brightening(truth.scene, grid.paths, n2)[:, None]
         return np.where((grid.landing.status == Status.HIT)[:, None], level, 0.0)
 
-    true = areas.mean(light)
-    used = used & areas.whole
-    if not used.any():
-        raise Unmeasurable("every pixel of this path holds an edge")
-    rows = np.flatnonzero(used)
-    order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
-    comparison = binned(pixels.reshape(-1, 3).astype(np.float64), true, order, noise)
-    comparison.detail.update(nature(truth, used) | truth.conditions(used))
-    return comparison
+    areas = pixel_areas(truth)
+    return MeanLight(areas.mean(light), areas.whole)
 
 
 def critical_angle(

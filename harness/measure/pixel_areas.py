@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float
-from harness.measure.probe_truth import ProbeTruth
+from harness.expected import Float, lengths
+from harness.measure.probe_truth import ProbeTruth, kept
 from harness.measure.rays import RayMeasurement
 from harness.renderers.base import Rays, Status
 from harness.truth.camera import rays_through
@@ -69,6 +69,14 @@ class PixelAreas:
         return means
 
 
+@dataclass(frozen=True)
+class MeanLight:
+    """(m, 3) means over pixels of the true light, and which of the m pixels are `whole`."""
+
+    level: Float
+    whole: NDArray[np.bool_]
+
+
 def pixel_areas(truth: ProbeTruth) -> PixelAreas:
     """Of the truth's own film."""
     m = len(truth.grazing)
@@ -116,8 +124,23 @@ def over_areas(rays: RayMeasurement, truth: ProbeTruth) -> RayMeasurement:
     The mean of a pixel is somewhere in what its corners enclose, so it is uncertain by how far the
     farthest of them is. Where not all of a pixel's rays end alike, it tells nothing.
     """
-    areas, form = _grid(truth, np.arange(len(rays.seen)), SMOOTH), ClosedForm(truth.scene)
-    alike = np.ones(len(rays.seen), bool)
+    alike, reach = _landings_within_pixels(truth)
+    direction_uncertainty = rays.direction_uncertainty
+    if len(reach) == 2:
+        way = lengths(truth.landings[1].point - truth.landings[0].point)
+        direction_uncertainty = direction_uncertainty + (reach[0] + reach[1]) / way
+    return replace(
+        rays, mixed=rays.mixed | ~alike, point_uncertainty=rays.point_uncertainty + reach[0],
+        direction_uncertainty=direction_uncertainty,
+    )  # fmt: skip
+
+
+@kept
+def _landings_within_pixels(truth: ProbeTruth) -> tuple[NDArray[np.bool_], list[Float]]:
+    """(m,) pixels of which all rays end alike, and for each plane (m,) how far apart they land."""
+    m = len(truth.grazing)
+    areas, form = _grid(truth, np.arange(m), SMOOTH), ClosedForm(truth.scene)
+    alike = np.ones(m, bool)
     reach = []
     for plane, centre in zip(truth.planes, truth.landings, strict=True):
         landing = form.land(areas.paths, plane)
@@ -128,11 +151,4 @@ def over_areas(rays: RayMeasurement, truth: ProbeTruth) -> RayMeasurement:
             alike &= (areas.by_pixel(fine) == own[:, None]).all(axis=1)
         aside = areas.by_pixel(landing.point) - centre.point[:, None]
         reach.append(np.nan_to_num(np.linalg.norm(aside, axis=-1).max(axis=1)) * TO_BORDER)
-    direction_uncertainty = rays.direction_uncertainty
-    if len(reach) == 2:
-        way = np.linalg.norm(truth.landings[1].point - truth.landings[0].point, axis=1)
-        direction_uncertainty = direction_uncertainty + (reach[0] + reach[1]) / way
-    return replace(
-        rays, mixed=rays.mixed | ~alike, point_uncertainty=rays.point_uncertainty + reach[0],
-        direction_uncertainty=direction_uncertainty,
-    )  # fmt: skip
+    return alike, reach

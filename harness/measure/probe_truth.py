@@ -7,9 +7,11 @@ differences, so it knows curvature, grazing incidence and the neighbourhood of t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, wraps
+from typing import Concatenate, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +58,7 @@ class Condition:
         return np.asarray(unit * (own + steps * start) + precision.data / 2 * self.by_index)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ProbeTruth:
     """Truth of all m rays of one probe.
 
@@ -197,6 +199,30 @@ class ProbeTruth:
     def level_tolerance(self, precision: Precision) -> Float:
         """Bound on the level's error."""
         return self.weight.bound(ROUNDINGS, self._steps, self.extent, precision)
+
+
+Asked = ParamSpec("Asked")
+Made = TypeVar("Made")
+
+
+def kept(
+    make: Callable[Concatenate[ProbeTruth, Asked], Made],
+) -> Callable[Concatenate[ProbeTruth, Asked], Made]:
+    """What `make` makes of a truth is kept for as long as that is: all renderers ask for the same.
+
+    Nobody may change what is returned.
+    """
+    known: WeakKeyDictionary[ProbeTruth, dict[object, Made]] = WeakKeyDictionary()
+
+    @wraps(make)
+    def once(truth: ProbeTruth, *args: Asked.args, **named: Asked.kwargs) -> Made:
+        of_this = known.setdefault(truth, {})
+        key = (args, *sorted(named.items()))
+        if key not in of_this:
+            of_this[key] = make(truth, *args, **named)
+        return of_this[key]
+
+    return once
 
 
 def probe_truth(scene: ResolvedScene, path: str, planes: tuple[Rectangle, ...]) -> ProbeTruth:

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from harness import expected
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.light_parts import distance_to_nature, worst_level
-from harness.measure.pixel_areas import pixel_areas
+from harness.measure.pixel_areas import MeanLight, pixel_areas
 from harness.measure.precision import Precision
-from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
+from harness.measure.probe_truth import ROUNDINGS, ProbeTruth, kept
 from harness.measure.ray_parts import indices
 from harness.measure.statistics import Noise, binned
 from harness.renderers.base import Status
@@ -47,11 +47,10 @@ def all_light(
         "cut": float(light.cut[used].max()),
     }
     if noise is not None:
-        areas = pixel_areas(truth)
-        true = areas.mean(lambda grid: truth.all_light_of(grid.rays, n2, natural=False).level)
-        rows = np.flatnonzero(used & areas.whole)
+        mean = _mean_light(truth, n2)
+        rows = np.flatnonzero(used & mean.whole)
         order = rows[np.argsort(truth.theta_i[rows], kind="stable")]
-        comparison = binned(measured, true, order, noise)
+        comparison = binned(measured, mean.level, order, noise)
         comparison.detail.update(detail | truth.conditions(used))
         return comparison
     # Paths whose weight is the least to be followed may be followed by one and not by the other.
@@ -61,6 +60,14 @@ def all_light(
     return worst_level(truth, measured, true, tolerance, used, detail, "Light of all paths",
                        "quantum of the image + weights that may be cut + 8 eps per rounding chain "
                        "x condition of the Fresnel factors")  # fmt: skip
+
+
+@kept
+def _mean_light(truth: ProbeTruth, n2: bool) -> MeanLight:
+    """The light of all paths, true for a renderer that samples pixels."""
+    areas = pixel_areas(truth)
+    level = areas.mean(lambda grid: truth.all_light_of(grid.rays, n2, natural=False).level)
+    return MeanLight(level, areas.whole)
 
 
 def brewster_reflectance(
