@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.expected import Float
+from harness.expected import Float, lengths
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
 from harness.measure.precision import Precision
@@ -21,7 +21,7 @@ def ray_agreement(
     """Distance between the landing points that a renderer's ray API tells and its images show."""
     used, fault, _ = usable(truth, traced)
     seen, more, detail = usable(truth, coded)
-    error = np.linalg.norm(traced.point - coded.point, axis=1)
+    error = lengths(traced.point - coded.point)
     tolerance = coded.point_uncertainty + 2 * truth.point_tolerance(precision)
     return compare_rays(
         truth, error, 0.0, tolerance, used & seen, "; ".join(filter(None, (fault, more))), detail,

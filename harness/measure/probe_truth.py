@@ -215,7 +215,7 @@ def kept(
     known: WeakKeyDictionary[ProbeTruth, dict[object, Made]] = WeakKeyDictionary()
 
     @wraps(make)
-    def once(truth: ProbeTruth, *args: Asked.args, **named: Asked.kwargs) -> Made:
+    def once(truth: ProbeTruth, /, *args: Asked.args, **named: Asked.kwargs) -> Made:
         of_this = known.setdefault(truth, {})
         key = (args, *sorted(named.items()))
         if key not in of_this:

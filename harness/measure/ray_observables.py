@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness import expected
-from harness.expected import Float
+from harness.expected import Float, lengths
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
 from harness.measure.precision import Precision
@@ -35,7 +35,7 @@ from harness.truth.paths import ClosedForm
 def exit_point(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> Comparison:
     """Distance between measured and true landing point on the first plane, scene units."""
     used, fault, counts = usable(truth, rays)
-    error = np.linalg.norm(rays.point - truth.landings[0].point, axis=1)
+    error = lengths(rays.point - truth.landings[0].point)
     tolerance = rays.point_uncertainty + truth.point_tolerance(precision)
     vector = (rays.point - truth.landings[0].point)[worst_ray(error, tolerance, used)]
     detail = counts | {f"worst_d{axis}": float(x) for axis, x in zip("xyz", vector, strict=True)}
@@ -72,7 +72,7 @@ def internal_angle(truth: ProbeTruth, rays: RayMeasurement, precision: Precision
     used, fault, counts = usable(truth, rays)
     n = truth.paths.n[:, 0]
     way = rays.point - truth.paths.interface[:, 0]
-    length = np.linalg.norm(way, axis=1)
+    length = lengths(way)
     measured = angle_between(way / length[:, None], -n)
     ior_i, ior_t = indices(truth)
     true = expected.snell_angle(truth.theta_i, ior_i, ior_t)

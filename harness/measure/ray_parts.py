@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float
+from harness.expected import Float, cross, lengths
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.probe_truth import ROUNDINGS, ProbeTruth
 from harness.measure.rays import RayMeasurement
@@ -68,9 +68,7 @@ def indices(truth: ProbeTruth) -> tuple[float, float]:
 
 def angle_between(a: Float, b: Float) -> Float:
     """atan2(|a x b|, a . b): exact for small angles, where acos is not."""
-    return np.asarray(
-        np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b))
-    )
+    return np.asarray(np.arctan2(lengths(cross(a, b)), np.einsum("ij,ij->i", a, b)))
 
 
 def worst_ray(error: Float, tolerance: Float, used: NDArray[np.bool_]) -> int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.expected import Float
+from harness.expected import Float, cross, lengths
 from harness.measure.probe_truth import ProbeTruth
 from harness.measure.rays import RayMeasurement
 from harness.renderers.base import Status
@@ -35,13 +35,13 @@ def measured_direction(truth: ProbeTruth, rays: RayMeasurement) -> Float:
     if not truth.path:
         return np.full_like(rays.point, np.nan)
     way = rays.point - truth.paths.interface[:, -1]
-    return np.asarray(way / np.linalg.norm(way, axis=1, keepdims=True))
+    return np.asarray(way / lengths(way)[:, None])
 
 
 def ray_error(truth: ProbeTruth, rays: RayMeasurement) -> Float:
     """(m,) angle between measured and true direction in microradians; NaN where there is none."""
     a, b = measured_direction(truth, rays), truth.paths.direction
-    sine, cosine = np.linalg.norm(np.cross(a, b), axis=1), np.einsum("ij,ij->i", a, b)
+    sine, cosine = lengths(cross(a, b)), np.einsum("ij,ij->i", a, b)
     known = rays.seen & (truth.landings[0].status == Status.HIT)
     return np.asarray(np.where(known, np.arctan2(sine, cosine) * 1e6, np.nan))
 

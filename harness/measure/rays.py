@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float
+from harness.expected import Float, lengths
 from harness.measure.probe_truth import ProbeTruth
 from harness.probe.decode import Decoded, Reason, decode, lit_threshold
 from harness.probe.scenes import AMPLITUDE, AXES
@@ -101,7 +101,7 @@ def from_images(
     if len(places) == 2:
         far, far_uncertainty, far_seen, far_undecided, _ = places[1]
         gap = far - point
-        length = np.linalg.norm(gap, axis=1)
+        length = lengths(gap)
         with np.errstate(invalid="ignore", divide="ignore"):
             direction = gap / length[:, None] * _order(truth)[:, None]
             direction_uncertainty = (uncertainty + far_uncertainty) / length

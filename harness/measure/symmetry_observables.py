@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from harness import expected_systems
-from harness.expected import Float
+from harness.expected import Float, lengths
 from harness.measure.comparison import Comparison, Unmeasurable
 from harness.measure.curves import curve_of_rows
 from harness.measure.precision import Precision
@@ -36,8 +36,8 @@ def skewness(truth: ProbeTruth, rays: RayMeasurement, precision: Precision) -> C
     start, aside = truth.rays.origins - origin, rays.point - origin
     true = expected_systems.skewness(start, truth.rays.directions, axis, before)
     value = expected_systems.skewness(aside, direction, axis, behind)
-    by_point = np.linalg.norm(np.cross(truth.paths.direction, axis), axis=1)
-    by_direction = np.linalg.norm(np.cross(truth.landings[0].point - origin, axis), axis=1)
+    by_point = lengths(np.cross(truth.paths.direction, axis))
+    by_direction = lengths(np.cross(truth.landings[0].point - origin, axis))
     tolerance = behind * (
         by_point * (rays.point_uncertainty + truth.point_tolerance(precision))
         + by_direction * (rays.direction_uncertainty + truth.direction_tolerance(precision))

@@ -11,19 +11,39 @@ import psutil
 PERIOD_S = 2.0  # a look that walks through pages takes 10 to 30 ms
 
 
-def memory_mb(seen: float = 0.0) -> float:
-    """MiB that this process and all below it take now; `seen` where that is no less.
+class Look:
+    """Looks at the MiB that this process and all below it take now.
 
     On Linux the sum of proportional sizes (PSS): pages that several share count once. Elsewhere,
     and of what may not be looked into, the resident size, which counts them for each. That is never
-    less and cheap to ask for, while for the other the kernel walks through every page: so where
-    not even the resident sizes amount to more than `seen`, nothing else is asked for.
+    less and cheap to ask for, while for the other the kernel walks through every page.
     """
-    me = psutil.Process()
-    everyone = [me, *me.children(recursive=True)]
-    if sum(map(_resident, everyone)) <= seen * 2**20:
-        return seen
-    return max(seen, sum(map(_proportional, everyone)) / 2**20)
+
+    def __init__(self) -> None:
+        self._shared = (
+            0.0  # by how many bytes the resident sizes were more when both were looked at
+        )
+
+    def __call__(self, seen: float = 0.0) -> float:
+        """MiB; `seen` where that is no less.
+
+        So much is taken for granted where the resident sizes, less half of what they had counted
+        more than once, do not amount to more. Libraries that renderers share are most of that: to
+        be rid of half of it, about half of the renderers must end, and what they held goes, too.
+        """
+        me = psutil.Process()
+        everyone = [me, *me.children(recursive=True)]
+        resident = sum(map(_resident, everyone))
+        if resident - self._shared / 2 <= seen * 2**20:
+            return seen
+        proportional = sum(map(_proportional, everyone))
+        self._shared = max(0.0, resident - proportional)
+        return max(seen, proportional / 2**20)
+
+
+def memory_mb(seen: float = 0.0) -> float:
+    """A single look."""
+    return Look()(seen)
 
 
 def _resident(process: psutil.Process) -> int:
@@ -48,13 +68,14 @@ class Peak:
 
 @contextlib.contextmanager
 def watched(
-    look: Callable[[float], float] = memory_mb, period_s: float = PERIOD_S
+    look: Callable[[float], float] | None = None, period_s: float = PERIOD_S
 ) -> Iterator[Peak]:
     """Looks every `period_s` from a thread, at the beginning and at the end.
 
     `look` is told the largest that was seen so far, and need not tell what is less.
     """
     peak, over = Peak(), threading.Event()
+    look = look or Look()
 
     def watch() -> None:
         while True:

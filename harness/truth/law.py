@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +38,7 @@ class Interface:
     leg: Float
     on_mesh: Mask
 
-    @property
+    @cached_property
     def cos_theta_i(self) -> Float:
         return np.asarray(np.clip(-np.einsum("ij,ij->i", self.direction, self.n), 0, 1))
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float
+from harness.expected import Float, lengths
 from harness.scene.resolved import Cone, Frame, Lens
 from harness.truth.intervals import Chord, both, planes_chord, without
 
@@ -172,5 +172,5 @@ def _local(frame: Frame, origin: Float, opens: float, o: Float, d: Float) -> tup
 def _world(frame: Frame, opens: float, local: Float) -> Float:
     """Unit vectors of the world from vectors in the frame."""
     axes = np.array([frame.x, frame.y, opens * np.array(frame.z)])
-    length = np.linalg.norm(local, axis=1, keepdims=True)
+    length = lengths(local)[:, None]
     return np.asarray(local / np.where(length > 0, length, 1.0) @ axes)

@@ -99,12 +99,12 @@ class ClosedForm:
         scene, bodies, law = self.scene, self._bodies, self.law
         m, count = len(rays.origins), len(path)
         rows = np.arange(m)
-        o, d = rays.origins.copy(), rays.directions.copy()
+        o, d = rays.origins, rays.directions
         status = np.full(m, Status.HIT, np.int8)
         weight, absorbed = np.ones(m), np.zeros((m, 3))
         cos_i, eta = np.full((m, count), np.nan), np.ones((m, count))
         whole = np.zeros((m, count), bool)
-        interface, normals = (np.full((m, count, 3), np.nan) for _ in range(2))
+        interface, normals = [np.empty((m, 0, 3))], [np.empty((m, 0, 3))]
         ior = np.array([medium.ior for medium in scene.media])
         sigma = np.array([medium.absorption for medium in scene.media])
         chords = [body.chords(o, d) for body in bodies]
@@ -123,7 +123,7 @@ class ClosedForm:
             live = status == Status.HIT
             t = np.where(live, t, 0.0)
             o = o + t[:, None] * d
-            start = normals[:, k - 1] if k else None
+            start = normals[-1][:, 0] if k else None
             if self._absorbs:
                 absorbed += law.depth(Leg(t, d, sigma[medium], start, letter))
             facing = np.where((np.einsum("ij,ij->i", d, n) > 0)[:, None], -n, n)
@@ -135,7 +135,9 @@ class ClosedForm:
                 beyond = np.where(live, self._filling(inside ^ at_once), 0)
             at = Interface(o, d, facing, ior[medium], ior[beyond], ~leaving, t, self._meshes[which])
             c, reflectance = at.cos_theta_i, law.reflectance(at)
-            cos_i[live, k], interface[live, k], normals[live, k] = c[live], o[live], facing[live]
+            cos_i[:, k] = np.where(live, c, np.nan)
+            interface.append(np.where(live[:, None], o, np.nan)[:, None])
+            normals.append(np.where(live[:, None], facing, np.nan)[:, None])
             whole[:, k] = live & (reflectance >= 1)
             if letter == "R":
                 weight *= np.where(live, reflectance, 1.0)
@@ -154,10 +156,10 @@ class ClosedForm:
             else:
                 inside ^= at_once & live
             medium = np.where(live, beyond, medium)
-        ahead = self.next_interface(o, d, inside).t
         return TruePaths(
-            status, o, d, medium, weight, absorbed, cos_i, eta, whole, interface, normals, inside,
-            ahead,
+            status, o, d, medium, weight, absorbed, cos_i, eta, whole,
+            np.concatenate(interface, axis=1), np.concatenate(normals, axis=1), inside,
+            self._ahead(o, d, inside),
         )  # fmt: skip
 
     def land(self, paths: TruePaths, plane: Rectangle) -> Landing:
@@ -206,6 +208,12 @@ class ClosedForm:
         """(solids, m) which solids the rays start in."""
         chords = [body.chords(rays.origins, rays.directions) for body in self._bodies]
         return _enclosing(chords, len(rays.origins))
+
+    def _ahead(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Float:
+        """(m,) how far away the next boundary is."""
+        if self._meeting:
+            return self._visible_interface(o, d, inside.copy())[0]
+        return _next_interface([body.chords(o, d) for body in self._bodies], inside)[0]
 
     def next_interface(self, o: Float, d: Float, inside: NDArray[np.bool_]) -> Boundary:
         """The next boundary of rays from `o` along `d` that are in the solids `inside`."""

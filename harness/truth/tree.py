@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.expected import Float, cross, fresnel, reflect, refract
+from harness.expected import Float, cross, fresnel, lengths, reflect, refract
 from harness.renderers.base import Rays, Status
 from harness.scene.resolved import Rectangle
 from harness.truth.paths import Boundary, ClosedForm
@@ -177,12 +177,12 @@ def _turned(field: Complex, d: Float, out: Float, n: Float, amplitude: Complex) 
     s = d x n, p = s x d. At normal incidence any s across the ray will do.
     """
     s = cross(d, n)
-    length = np.linalg.norm(s, axis=1, keepdims=True)
+    length = lengths(s)[:, None]
     s /= np.where(length > 0, length, 1.0)
     if (head_on := ~(length[:, 0] > 1e-12)).any():
         s[head_on] = _across(d[head_on])
     s -= np.einsum("ij,ij->i", s, out)[:, None] * out
-    s /= np.linalg.norm(s, axis=1, keepdims=True)
+    s /= lengths(s)[:, None]
     along_s = np.einsum("kij,kj->ki", field, s) * amplitude[:, :1]
     along_p = np.einsum("kij,kj->ki", field, cross(s, d)) * amplitude[:, 1:]
     turned = along_s[:, :, None] * s[:, None] + along_p[:, :, None] * cross(s, out)[:, None]
@@ -193,7 +193,7 @@ def _across(d: Float) -> Float:
     """A unit vector across each direction."""
     helper = np.where(np.abs(d[:, :1]) < 0.6, [[1.0, 0, 0]], [[0, 1.0, 0]])
     e = cross(d, helper)
-    return np.asarray(e / np.linalg.norm(e, axis=1, keepdims=True))
+    return np.asarray(e / lengths(e)[:, None])
 
 
 def _two_waves(d: Float) -> Complex:

@@ -9,7 +9,8 @@ import threading
 import psutil
 import pytest
 
-from harness.running.memory import memory_mb, watched
+from harness.running import memory
+from harness.running.memory import Look, memory_mb, watched
 
 HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(); sys.stdin.read()"
 
@@ -60,3 +61,30 @@ def test_pages_are_not_walked_through_where_all_that_is_resident_is_no_more_than
     assert memory_mb(seen=1e6) == 1e6
     with pytest.raises(AssertionError):
         memory_mb()
+
+
+def test_they_are_walked_through_again_once_more_is_resident_than_sharing_explains(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of 400 MiB resident, 100 were counted twice: 350 need no second walk."""
+    resident, walks = [400.0], []
+
+    def walk(_: psutil.Process) -> int:
+        walks.append(1)
+        return int((resident[0] - 100) * 2**20)
+
+    monkeypatch.setattr(psutil.Process, "children", lambda *_, **__: [])
+    monkeypatch.setattr(memory, "_resident", lambda _: int(resident[0] * 2**20))
+    monkeypatch.setattr(memory, "_proportional", walk)
+    look = Look()
+    assert look(0.0) == 300
+    assert len(walks) == 1
+    resident[0] = 350.0
+    assert look(300.0) == 300
+    assert len(walks) == 1
+    resident[0] = 351.0
+    assert look(300.0) == 300
+    assert len(walks) == 2
+    resident[0] = 450.0
+    assert look(300.0) == 350
+    assert len(walks) == 3
