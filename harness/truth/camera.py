@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.expected import Float, lengths
+from harness.expected import Float
 from harness.renderers.base import Rays
 from harness.scene.resolved import Orthographic, ResolvedScene
 
@@ -32,5 +32,5 @@ def rays_through(scene: ResolvedScene, across: Float, down: Float) -> Rays:
         return Rays(origins, np.broadcast_to(forward, origins.shape).copy())
     k = camera.tan_half_fov_x
     directions = forward + k * (x * right + y * up)
-    directions /= lengths(directions)[:, None]
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     return Rays(np.broadcast_to(np.array(camera.origin), directions.shape).copy(), directions)
