@@ -16,6 +16,8 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from tracer.parts import PartCompiler
+
 _numba: Any = numba  # its own types cover little of it
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -46,11 +48,11 @@ def compiled(function: Function) -> Function:
 def inlined(function: Function) -> Function:
     """As `compiled`, for parts of compiled functions; Python cannot call it.
 
-    That saves the code that unpacks Python's arguments, and a twentieth of all compilation as it
-    is not kept on disk by itself. It is merged into its callers, because a scene's arrays are a
-    hundred arguments, too many to pass for every ray.
+    That saves the code that unpacks Python's arguments, machine code (see `tracer.parts`), and a
+    twentieth of all compilation as it is not kept on disk by itself. It is merged into its callers,
+    because a scene's arrays are a hundred arguments, too many to pass for every ray.
     """
-    return _compiled(function, forceinline=True, no_cpython_wrapper=True)
+    return _part(function, forceinline=True)
 
 
 def called(function: Function) -> Function:
@@ -58,12 +60,16 @@ def called(function: Function) -> Function:
 
     This has to be said, or a function takes after the one for which it is compiled.
     """
-    return _compiled(function, forceinline=False, no_cpython_wrapper=True)
+    return _part(function, forceinline=False)
 
 
 def merged(function: Function) -> Function:
     """As `inlined`, for what one function alone calls: merged first, and compiled once."""
-    return _compiled(function, inline="always", no_cpython_wrapper=True)
+    return _part(function, inline="always")
+
+
+def _part(function: Function, **options: Any) -> Function:
+    return _compiled(function, no_cpython_wrapper=True, pipeline_class=PartCompiler, **options)
 
 
 @contextmanager

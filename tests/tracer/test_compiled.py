@@ -52,6 +52,24 @@ def test_where_nothing_can_be_kept_it_is_compiled_all_the_same() -> None:
     assert run(PACKAGE.parent, code) == "(1.0, 0.0, 0.0)"
 
 
+def test_parts_of_kernels_are_no_machine_code_of_their_own() -> None:
+    code = (
+        "from tracer.compiled import called, compiled, inlined\n"
+        "@inlined\n"
+        "def double(x): return 2.0 * x\n"
+        "@called\n"
+        "def more(x): return double(x) + 1.0\n"
+        "@compiled\n"
+        "def most(x): return more(x) + double(x)\n"
+        "print(most(3.0))\n"
+        "for function in double, most:\n"
+        "    (made,) = function.overloads.values()\n"
+        "    engine, name = made.library.codegen._engine, made.fndesc.mangled_name\n"
+        "    print(engine.is_symbol_defined(name))\n"
+    )
+    assert run(PACKAGE.parent, code).split() == ["13.0", "False", "True"]
+
+
 def test_importing_the_package_imports_no_compiler() -> None:
     code = "import sys, tracer; print('numba' in sys.modules, 'numpy' in sys.modules)"
     assert run(PACKAGE.parent, code) == "False False"
