@@ -15,6 +15,7 @@ from typing import Any
 
 from harness.record import write_text
 from tests.bench import costs, rivals
+from tests.bench.convergence import mesh_convergence
 from tests.bench.measuring import ROOT, Figures
 from tests.bench.plot import draw
 
@@ -58,7 +59,7 @@ def main(names: list[str]) -> None:
         "depth": costs.over_depth(),
         "wavelengths": costs.over_wavelengths(),
         "triangles": costs.over_triangles(),
-        "convergence": costs.mesh_convergence(),
+        "convergence": mesh_convergence(),
     }
     document = {
         **measured,

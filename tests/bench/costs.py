@@ -16,8 +16,7 @@ from harness.translate.tracer import translate
 from tests.bench.measuring import ROOT, Figures, best, icosphere, median, scene_of, seconds
 from tracer.mesh import Mesh
 from tracer.patterns import Constant
-from tracer.scene import Emissive, Medium, Scene, Solid, Surface, Transport
-from tracer.shapes import Sphere
+from tracer.scene import Emissive, Medium, Scene, Surface, Transport
 from tracer.spectrum import GLASSES
 
 Curve = list[tuple[float, float]]
@@ -90,34 +89,6 @@ def over_triangles() -> Curve:
         spent = best(lambda s=scene: tracer.follow(s, origins, directions, "", threads=1))  # type: ignore[misc]
         curve.append((float(len(mesh.triangles)), spent / len(origins)))
     return curve
-
-
-def mesh_convergence() -> dict[str, Curve]:
-    """RMS angle, in radians, between rays through a ball of triangles and through a true ball.
-
-    Of order 1 in the length of an edge with flat faces, 2 with smooth normals.
-    """
-    rng = np.random.default_rng(2)
-    origins = np.column_stack([rng.uniform(-0.55, 0.55, (20_000, 2)), np.full(20_000, 3.0)])
-    directions = np.broadcast_to([0.0, 0.0, -1.0], origins.shape)
-    camera = translate(scene_of("ball/checkerboard.toml", 8)).camera
-    lamp = Surface(Sphere((0.0, 0.0, 0.0), 50.0), Emissive(Constant((1.0, 1.0, 1.0))))
-    glass = Medium(1.5)
-
-    def leaving(shape: Sphere | Mesh) -> np.ndarray:
-        scene = Scene(camera, (Solid(shape, glass),), (lamp,))
-        return tracer.follow(scene, origins, directions, "TT").direction
-
-    true = leaving(Sphere((0.0, 0.0, 0.0), 1.0))
-    curves: dict[str, Curve] = {"flat": [], "smooth": []}
-    for subdivisions in range(1, 8):
-        vertices, triangles = icosphere(subdivisions)
-        normals = vertices / np.linalg.norm(vertices, axis=1)[:, None]
-        for name, own in (("flat", None), ("smooth", normals)):
-            across = np.linalg.norm(np.cross(leaving(Mesh(vertices, triangles, own)), true), axis=1)
-            rms = float(np.sqrt(np.nanmean(np.arcsin(np.clip(across, 0, 1)) ** 2)))
-            curves[name].append((float(len(triangles)), rms))
-    return curves
 
 
 # --- before the first picture ---------------------------------------------------------------------

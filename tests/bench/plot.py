@@ -7,6 +7,14 @@ from pathlib import Path
 from typing import Any
 
 OURS, GOAL, OTHER = "#0b62c4", "#8a94a0", "#c4480b"
+STYLE = {
+    "svg.hashsalt": "snellcheck",
+    "svg.fonttype": "none",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+}
 
 
 def draw(
@@ -18,8 +26,7 @@ def draw(
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    style = {"svg.hashsalt": "snellcheck", "font.size": 9, "axes.spines.top": False}
-    with mpl.rc_context({**style, "axes.spines.right": False, "axes.titlesize": 10}):
+    with mpl.rc_context(STYLE):
         figure, axes = plt.subplots(2, 3, figsize=(13, 7), layout="constrained")
         _ratios(axes[0, 0], figures, goals)
         _curve(axes[0, 1], curves["pixels"], "pixels", "s", "Pixels: linear", linear=True)
@@ -74,12 +81,33 @@ def _curve(
     axes.set_title(title)
 
 
+def draw_convergence(
+    curves: Mapping[str, Sequence[Sequence[float]]], orders: Mapping[str, float], file: Path
+) -> None:
+    """As an SVG by itself, with the orders that were measured between the finest two meshes."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    with mpl.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+        named = {f"{name}, order {orders[name]:.2f}": curve for name, curve in curves.items()}
+        _convergence(axes, named)
+        figure.savefig(file, metadata={"Date": None})
+        plt.close(figure)
+
+
 def _convergence(axes: Any, curves: Mapping[str, Sequence[Sequence[float]]]) -> None:
-    for (name, curve), colour, power in zip(curves.items(), (OTHER, OURS), (-0.5, -1), strict=True):
+    """Flat and smooth, each with a grey line of slope 1 or 2 through its finest mesh."""
+    for (name, curve), colour, power in zip(curves.items(), (OTHER, OURS), (1, 2), strict=True):
         xs, ys = zip(*curve, strict=True)
+        line = [ys[-1] * (x / xs[-1]) ** power for x in xs]
+        axes.loglog(xs, line, "--", color=GOAL)
         axes.loglog(xs, ys, "o-", color=colour, label=name)
-        axes.loglog(xs, [ys[-1] * (v / xs[-1]) ** power for v in xs], "--", color=GOAL)
-    axes.set_xlabel("triangles of a glass ball")
+        beside = {"xytext": (8, -8), "textcoords": "offset points", "color": GOAL}
+        axes.annotate(f"slope {power}", (xs[2], line[2]), **beside)
+    axes.set_xlabel("mean edge of a glass ball's triangles, in radii")
     axes.set_ylabel("RMS error of the exit direction, rad")
     axes.legend(frameon=False)
     axes.set_title("Polygons: order 1 flat, order 2 smooth")
