@@ -37,6 +37,7 @@ class Watch:
     memory_mb: int
     output_mb: int = OUTPUT_MB
     private: Path | None = None
+    _rest: float = LEAST_S
     _next: float = field(default_factory=lambda: time.monotonic() + LEAST_S)
 
     def rest_s(self, deadline: float) -> float:
@@ -47,7 +48,9 @@ class Watch:
         """Which limit was passed, "" where none was or where it is too soon to look again."""
         if time.monotonic() < self._next:
             return ""
-        memory_left = self.memory_mb - self.tree.resident_mb()
+        # All that watch share a list of processes. Who is not in it yet may have filled memory since.
+        listed_s = self._rest / 2
+        memory_left = self.memory_mb - self.tree.resident_mb(listed_s)
         if memory_left < 0:
             return f"used more than {self.memory_mb} MB of memory"
         if self.tree.more_than(MOST_PROCESSES):
@@ -55,8 +58,9 @@ class Watch:
         files_left = self.output_mb - self._files_mb()
         if files_left < 0:
             return f"wrote more than {self.output_mb} MB of files"
-        lasts_s = min(memory_left / MEMORY_MB_S, files_left / FILES_MB_S)
-        self._next = time.monotonic() + min(LEAST_S + lasts_s, MOST_S)
+        lasts_s = min(max(0.0, memory_left / MEMORY_MB_S - listed_s), files_left / FILES_MB_S)
+        self._rest = min(LEAST_S + lasts_s, MOST_S)
+        self._next = time.monotonic() + self._rest
         return ""
 
     def _files_mb(self) -> float:

@@ -12,6 +12,7 @@ import re
 import shlex
 import shutil
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ from harness.renderers.process import Finished, run_limited
 from harness.renderers.process_tree import attempts
 from harness.renderers.proof import proof_scene, prove
 from harness.scene import resolved as rs
-from harness.temporary import temporary_folder
+from harness.temporary import make_folder, temporary_folder
 from harness.translate.povray import MAX_TRACE_LEVEL, PovScene, options, translate
 from harness.translate.povray_stock import translate as translate_stock
 
@@ -216,28 +217,52 @@ def _write(translated: PovScene, scene: rs.ResolvedScene, folder: Path) -> Path:
     return main
 
 
+class _Home:
+    """A home for all of POV-Ray's processes, so that no settings of the user or site count.
+
+    They may read it, not write to it. It goes with the temporary folders of this process.
+    """
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """After a fork, too: the folder is the parent's, and a lost thread may hold the lock."""
+        self._lock = threading.Lock()
+        self._path: Path | None = None
+
+    def path(self) -> Path:
+        with self._lock:
+            if self._path is None or not (self._path / INI).is_file():
+                self._path = make_folder()
+                for series in ("3.7", "3.8"):
+                    configuration = self._path / ".povray" / series / "povray.conf"
+                    configuration.parent.mkdir(parents=True)
+                    configuration.write_text(CONFIGURATION, encoding="ascii")
+                (self._path / INI).touch()
+            return self._path
+
+
+INI = "povray.ini"
+_HOME = _Home()
+os.register_at_fork(after_in_child=_HOME.forget)
+
+
 def _run(argv: list[str], folder: Path, settings: RenderSettings) -> Finished:
-    """Runs POV-Ray with a home of its own, so that no settings of the user or site count."""
-    home = folder / "home"
-    for series in ("3.7", "3.8"):
-        configuration = home / ".povray" / series / "povray.conf"
-        configuration.parent.mkdir(parents=True, exist_ok=True)
-        configuration.write_text(CONFIGURATION, encoding="ascii")
-    ini = home / "povray.ini"
-    ini.touch()
-    env = {**os.environ, "HOME": str(home), "POVINI": str(ini), "TMPDIR": str(folder)}
+    home = _HOME.path()
+    env = {**os.environ, "HOME": str(home), "POVINI": str(home / INI), "TMPDIR": str(folder)}
     try:
         return run_limited(
             argv, cwd=folder, timeout_s=settings.timeout_s, memory_mb=settings.memory_mb,
-            private=folder, confinement=confinement(argv[0]), env=env,
+            private=folder, confinement=confinement(argv[0], home), env=env,
         )  # fmt: skip
     except RendererFailed as error:
         raise RendererFailed(str(error), log=messages(error.log)) from None
 
 
-def confinement(executable: str) -> Confinement:
+def confinement(executable: str, *readable: Path) -> Confinement:
     """POV-Ray reads what belongs to the system and to itself, and writes beside its scene alone."""
-    places = [Path(executable).resolve().parents[1], Path(executable).parent]
+    places = [Path(executable).resolve().parents[1], Path(executable).parent, *readable]
     loaded = os.environ.get("LD_LIBRARY_PATH", "").split(os.pathsep)
     places += [Path(place) for place in loaded if place]
     return Confinement(readable=(*SYSTEM, *places), shares=False)

@@ -95,8 +95,6 @@ class _Pids:
 
 _PIDS = _Pids()
 os.register_at_fork(after_in_child=_PIDS.forget)
-# How old a list of processes may be when memory is added up: half of the time between two looks.
-LISTED_S = 0.025
 _RUNNING: ContextVar[Running | None] = ContextVar("running", default=None)
 
 
@@ -116,9 +114,12 @@ class ProcessTree:
         self._strangers: set[int] = set()
         self.ended = False  # by kill()
 
-    def resident_mb(self) -> float:
-        """Resident memory of all members in MiB; pages that they share are counted for each."""
-        self._find_members(LISTED_S)
+    def resident_mb(self, listed_s: float = 0.0) -> float:
+        """Resident memory of all members in MiB; pages that they share are counted for each.
+
+        Who started in the last `listed_s` may not be counted yet.
+        """
+        self._find_members(listed_s)
         total = 0
         for member in self._members.values():
             with contextlib.suppress(psutil.Error):

@@ -20,7 +20,8 @@ class Tree:
     def __init__(self, resident: float) -> None:
         self.resident = resident
 
-    def resident_mb(self) -> float:
+    def resident_mb(self, listed_s: float) -> float:
+        self.listed_s = listed_s
         return self.resident
 
     def more_than(self, most: int) -> bool:
@@ -49,6 +50,22 @@ def test_nobody_overshoots_by_more_than_the_least_time_between_two_looks_lets_th
 
 def test_who_is_far_from_every_limit_is_left_alone_for_longest(tmp_path: Path) -> None:
     assert looked_at(100, 100_000, 100_000, tmp_path).rest_s(math.inf) > MOST_S - LEAST_S
+
+
+def test_who_was_not_listed_yet_may_have_filled_memory_since(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(time, "monotonic", lambda: 100.0)
+    left_mb = 0.16 * MEMORY_MB_S
+    watch = looked_at(200, 200 + int(left_mb), 100_000, tmp_path)
+    tree = cast(Tree, watch.tree)
+    for _ in range(3):
+        rest_s = watch.rest_s(math.inf)
+        assert LEAST_S - 1e-9 < rest_s
+        assert (rest_s - LEAST_S + tree.listed_s) * MEMORY_MB_S <= left_mb + 1e-6
+        watch._next = -math.inf
+        assert watch.passed() == ""
+        assert abs(tree.listed_s - rest_s / 2) < 1e-9
 
 
 def test_nobody_rests_beyond_a_deadline(tmp_path: Path) -> None:
