@@ -48,7 +48,7 @@ class Watch:
         """Which limit was passed, "" where none was or where it is too soon to look again."""
         if time.monotonic() < self._next:
             return ""
-        # All that watch share a list of processes. Who is not in it yet may have filled memory since.
+        # All that watch share a list of processes. Who is not yet in it may have filled memory.
         listed_s = self._rest / 2
         memory_left = self.memory_mb - self.tree.resident_mb(listed_s)
         if memory_left < 0:
