@@ -155,7 +155,7 @@ class ProbeTruth:
             natural,
         )
 
-    @property
+    @cached_property
     def theta_i(self) -> Float:
         """Angle of incidence at the first interface, radians; NaN where there is none."""
         return np.asarray(np.arccos(self.paths.cos_theta_i[:, 0]))
@@ -167,12 +167,12 @@ class ProbeTruth:
         rows = np.arange(film.height * film.width) // film.width
         return np.asarray(rows == film.height // 2)
 
-    @property
+    @cached_property
     def level(self) -> Float:
         """(m, 3) what the path leaves of radiance 1: Fresnel factors times absorption."""
         return np.asarray(self.paths.weight[:, None] * self.landings[0].transmission)
 
-    @property
+    @cached_property
     def _steps(self) -> Float:
         """(m,) the roundings at the start and after each interface, all as if made at the start.
 
