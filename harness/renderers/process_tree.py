@@ -73,7 +73,7 @@ class Running:
 
 
 class _Pids:
-    """All processes of the machine, listed once for all trees that ask at about the same time."""
+    """All processes of the machine, looked at once for all trees that ask about the same time."""
 
     def __init__(self) -> None:
         self.forget()
@@ -83,6 +83,7 @@ class _Pids:
         self._lock = threading.Lock()
         self._found: set[int] = set()
         self._when = -math.inf
+        self._tokens: dict[int, str] = {}
 
     def listed(self, seconds: float) -> set[int]:
         """As of no more than `seconds` ago; not for the caller to change."""
@@ -90,7 +91,23 @@ class _Pids:
             if time.monotonic() - self._when >= seconds:
                 self._when = time.monotonic()
                 self._found = set(psutil.pids())
+                gone = self._tokens.keys() - self._found
+                for pid in gone:
+                    del self._tokens[pid]
             return self._found
+
+    def token(self, pid: int) -> str:
+        """The token in the environment of a listed process, "" where there is none to see.
+
+        What one tree starts is new to all others that are watched, and each would ask.
+        """
+        with self._lock:
+            if pid not in self._tokens:
+                try:
+                    self._tokens[pid] = psutil.Process(pid).environ().get(TOKEN, "")
+                except psutil.Error:
+                    self._tokens[pid] = ""
+            return self._tokens[pid]
 
 
 _PIDS = _Pids()
@@ -165,9 +182,9 @@ class ProcessTree:
         try:
             if os.getsid(pid) == self.process.pid:
                 return True
-            return bool(psutil.Process(pid).environ().get(TOKEN) == self._token)
-        except (OSError, psutil.Error):
+        except OSError:
             return False
+        return _PIDS.token(pid) == self._token
 
 
 def _runs(process: psutil.Process) -> bool:

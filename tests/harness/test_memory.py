@@ -10,17 +10,15 @@ import psutil
 import pytest
 
 from harness.running import memory
-from harness.running.memory import Look, memory_mb, watched
+from harness.running.memory import Look, watched
 
 HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(); sys.stdin.read()"
 
 
 def test_the_largest_look_counts() -> None:
     looks, third = iter([3.0, 8.0]), threading.Event()
-    told: list[float] = []
 
-    def look(seen: float) -> float:
-        told.append(seen)
+    def look() -> float:
         found = next(looks, None)
         if found is None:
             third.set()
@@ -29,62 +27,68 @@ def test_the_largest_look_counts() -> None:
     with watched(look, period_s=0.001) as peak:
         assert third.wait(10)
     assert peak.mb == 8.0
-    assert told[:3] == [0.0, 3.0, 8.0]
 
 
 def test_a_last_look_is_taken_however_short_the_run_was() -> None:
     looks = []
-    with watched(lambda _: looks.append(1) or float(len(looks)), period_s=60) as peak:
+    with watched(lambda: looks.append(1) or float(len(looks)), period_s=60) as peak:
         pass
     assert peak.mb == len(looks) == 2
 
 
 def test_what_children_hold_counts_until_they_end() -> None:
-    before = memory_mb()
+    look = Look()
+    before = look()
     with subprocess.Popen(
         [sys.executable, "-c", HOLD], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as child:
         assert child.stdout is not None
         child.stdout.readline()
-        during = memory_mb()
+        during = look()
     assert during > before + 100
-    assert memory_mb() < during - 90
+    assert look() < during - 90
 
 
-def test_pages_are_not_walked_through_where_all_that_is_resident_is_no_more_than_was_seen(
+def test_pages_are_walked_through_again_where_more_or_less_is_resident(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def walked(_: psutil.Process) -> None:
-        raise AssertionError
-
-    monkeypatch.setattr(psutil.Process, "memory_full_info", walked)
-    assert memory_mb(seen=1e6) == 1e6
-    with pytest.raises(AssertionError):
-        memory_mb()
-
-
-def test_they_are_walked_through_again_once_more_is_resident_than_sharing_explains(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Of 400 MiB resident, 100 were counted twice: 350 need no second walk."""
+    """Of 400 MiB resident, others count 100: of 403 as many, of 405 that is not known."""
     resident, walks = [400.0], []
 
-    def walk(_: psutil.Process) -> int:
+    def walk(_: psutil.Process, resident: int) -> int:
         walks.append(1)
-        return int((resident[0] - 100) * 2**20)
+        return resident - 100 * 2**20
 
     monkeypatch.setattr(psutil.Process, "children", lambda *_, **__: [])
     monkeypatch.setattr(memory, "_resident", lambda _: int(resident[0] * 2**20))
-    monkeypatch.setattr(memory, "_proportional", walk)
+    monkeypatch.setattr(memory, "_walked", walk)
     look = Look()
-    assert look(0.0) == 300
-    assert len(walks) == 1
-    resident[0] = 350.0
-    assert look(300.0) == 300
-    assert len(walks) == 1
-    resident[0] = 351.0
-    assert look(300.0) == 300
-    assert len(walks) == 2
-    resident[0] = 450.0
-    assert look(300.0) == 350
-    assert len(walks) == 3
+    for megabytes, walked in [(400.0, 1), (403.0, 1), (405.0, 2), (403.0, 2), (300.0, 3)]:
+        resident[0] = megabytes
+        assert look() == pytest.approx(megabytes - 100)
+        assert len(walks) == walked
+
+
+def test_a_copy_of_ours_that_is_about_to_be_another_program_does_not_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Between fork and exec a child has our command; who still has it later is no such child."""
+    look = Look()
+    before = look()
+    monkeypatch.setattr(memory, "_command", lambda _: ["ours"])
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLD], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as child:
+        assert child.stdout is not None
+        child.stdout.readline()
+        assert look() < before + 50
+        assert look() > before + 100
+
+
+def test_what_nobody_may_look_into_counts_as_resident(monkeypatch: pytest.MonkeyPatch) -> None:
+    def denied(_: psutil.Process) -> None:
+        raise psutil.AccessDenied
+
+    monkeypatch.setattr(psutil.Process, "memory_full_info", denied)
+    monkeypatch.setattr(psutil.Process, "children", lambda *_, **__: [])
+    assert Look()() == pytest.approx(psutil.Process().memory_info().rss / 2**20, rel=0.05)

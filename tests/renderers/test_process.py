@@ -23,7 +23,7 @@ from harness.errors import RendererFailed, RendererMissing
 from harness.renderers.command import CommandRenderer, Template
 from harness.renderers.confinement import Confinement
 from harness.renderers.process import Finished, run_limited, tail
-from harness.renderers.process_tree import Running, belong_to
+from harness.renderers.process_tree import Running, belong_to, spawn
 from tests.harness.tiny import run_tiny
 
 MISBEHAVE = Path(__file__).parents[1] / "fakes" / "misbehave.py"
@@ -233,6 +233,35 @@ def test_others_are_left_alone(tmp_path: Path) -> None:
     finally:
         bystander.kill()
         bystander.wait()
+
+
+def test_an_environment_is_read_once_for_all_who_watch(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    read: list[int] = []
+    environ = psutil.Process.environ
+
+    def counted(process: psutil.Process) -> dict[str, str]:
+        read.append(process.pid)
+        return environ(process)
+
+    monkeypatch.setattr(psutil.Process, "environ", counted)
+    pipe, sleep = subprocess.PIPE, [sys.executable, "-c", "import time; time.sleep(60)"]
+    trees = [
+        spawn(sleep, cwd=tmp_path, env=None, stdin=pipe, stdout=pipe, stderr=pipe, output_mb=1)
+        for _ in range(2)
+    ]
+    stranger = subprocess.Popen(sleep)
+    try:
+        for tree in trees * 2:
+            assert tree.resident_mb() > 0
+        assert read.count(stranger.pid) == 1
+    finally:
+        stranger.kill()
+        stranger.wait()
+        for tree in trees:
+            tree.kill()
+            tree.process.communicate()
 
 
 def test_tail_starts_with_a_line() -> None:
