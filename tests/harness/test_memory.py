@@ -12,7 +12,7 @@ import pytest
 from harness.running import memory
 from harness.running.memory import Look, watched
 
-HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(); sys.stdin.read()"
+HOLD = "import sys; held = bytearray(b'x') * (100 * 2**20); print(flush=True); sys.stdin.read()"
 
 
 def test_the_largest_look_counts() -> None:
